@@ -203,12 +203,28 @@ class Build {
     const char* const chosen =
         std::getenv("CC");  // NOLINT(concurrency-mt-unsafe): plcctl has one thread here
     const std::string adapters = fs::absolute(order_.adapters);
-    const auto end =
-        run_program({chosen == nullptr ? "cc" : chosen, "-std=gnu11", "-O2", "-g1", "-w", "-fPIC", "-shared",
-                     "-fvisibility=hidden", "-D__CURRENT_TIME=(*plchost_now())", "-I.", "-I" + adapters,
-                     "-I" + adapters + "/matiec", "-I" + fs::absolute(compiler_.headers).string(), "-o", made,
-                     glue, configuration().name + ".c", adapters + "/matiec/application.c", "-lm"},
-                    work_.path());
+    const auto end = run_program({chosen == nullptr ? "cc" : chosen,
+                                  "-std=gnu11",
+                                  "-O2",
+                                  "-g1",
+                                  "-w",
+                                  "-fPIC",
+                                  "-shared",
+                                  "-fvisibility=hidden",
+                                  "-D__CURRENT_TIME=(*plchost_now())",
+                                  "-I.",
+                                  "-I" + adapters,
+                                  "-I" + adapters + "/matiec",
+                                  "-I" + fs::absolute(compiler_.headers).string(),
+                                  "-o",
+                                  made,
+                                  glue,
+                                  configuration().name + ".c",
+                                  adapters + "/matiec/application.c",
+                                  adapters + "/matiec/places.c",
+                                  adapters + "/matiec/variables.c",
+                                  "-lm"},
+                                 work_.path());
     if (!end) return fail(end.error().describe());
     if (!end->success()) fail("the C compiler refuses what iec2c has written:" + first_lines(end->output));
   }

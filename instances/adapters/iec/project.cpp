@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,6 +16,7 @@ namespace plchost::iec {
 namespace {
 
 constexpr std::int64_t kMostPriority = 31;
+constexpr std::size_t kMostTasks = 1024;  // PLC_MAX_TASKS
 
 struct SectionWord {
   std::string_view word;
@@ -37,6 +39,7 @@ class ProjectReader {
   void read(const Source& source) {
     Tokens tokens = tokens_of(source.text, source.file);
     problems_.insert(problems_.end(), tokens.problems.begin(), tokens.problems.end());
+    for (const Token& token : tokens.all) note(token);
     std::erase_if(tokens.all, [](const Token& token) { return token.kind == Token::Kind::pragma; });
     tokens_ = std::move(tokens.all);
     next_ = 0;
@@ -64,6 +67,17 @@ class ProjectReader {
     report(token().place, fmt::format("the name of {} is missing", what));
     return "";
   }
+  void note(const Token& token) {
+    if (token.kind == Token::Kind::place) project_.locations.try_emplace(folded(token.text), token.place);
+    if (token.kind == Token::Kind::pragma && folded(token.text).starts_with("{#INCLUDE"))
+      report(token.place, "{#include}: give the other file to the build as one of its sources instead");
+  }
+  /// False: the file has ended before.
+  bool take_end(std::string_view word, std::string_view what, const SourcePlace& begin) {
+    if (take(word)) return true;
+    if (at_end()) report(begin, fmt::format("{} has no {} in this file", what, word));
+    return at_end();
+  }
   void report(const SourcePlace& place, std::string text) { problems_.push_back({place, std::move(text)}); }
   /// Behind the next such word; the text may end before.
   void skip_past(std::string_view word) {
@@ -82,29 +96,41 @@ class ProjectReader {
   // Mode : (idle, busy); Point : STRUCT x : REAL; END_STRUCT;
   void read_types() {
     while (!at_end() && !take("END_TYPE")) {
-      if (token().kind == Token::Kind::name) project_.types.push_back({token().text, token().place});
+      DeclaredType type{.name = token().text, .definition = "", .place = token().place};
+      const bool is_named = token().kind == Token::Kind::name;
       for (int depth = 0; !at_end() && !at("END_TYPE"); take()) {
+        type.definition += folded(token().text) + " ";
         if (at("STRUCT")) ++depth;
         if (at("END_STRUCT")) --depth;
         if (at(";") && depth <= 0) break;
       }
+      if (is_named) project_.types.push_back(std::move(type));
       take(";");
     }
   }
 
   void read_pou(Pou::Kind kind, std::string_view end) {
-    Pou pou{.kind = kind, .name = "", .variables = {}, .place = take().place};
+    Pou pou{.kind = kind, .name = "", .variables = {}, .chart = "", .place = take().place};
     pou.name = take_name("this POU");
-    while (!at_end() && !take(end)) {
+    while (!take_end(end, pou.name, pou.place)) {
       if (const SectionWord* const section = section_here()) {
         read_section(section->section, pou.variables);
       } else {
-        take();
+        read_statement(pou);
       }
     }
     if (project_.pou(pou.name) != nullptr)
       report(pou.place, fmt::format("there are two POUs '{}'", pou.name));
-    project_.pous.push_back(std::move(pou));
+    project_.add(std::move(pou));
+  }
+
+  // A word of it. Of a chart the elements are told.
+  void read_statement(Pou& pou) {
+    constexpr std::array<std::string_view, 4> kElements{"INITIAL_STEP", "STEP", "TRANSITION", "ACTION"};
+    const bool is_element = std::ranges::any_of(kElements, [&](std::string_view word) { return at(word); });
+    const bool is_first = at("INITIAL_STEP");
+    const std::string word = folded(take().text);
+    if (is_first || (is_element && !pou.chart.empty())) pou.chart += word + " " + folded(token().text) + "; ";
   }
 
   [[nodiscard]] const SectionWord* section_here() const noexcept {
@@ -137,6 +163,8 @@ class ProjectReader {
       if (token().kind == Token::Kind::name && !at("AT")) variable.name = take().text;
       if (take("AT")) {
         if (token().kind == Token::Kind::place) variable.location = folded(take().text);
+        if (variable.name.empty())
+          report(variable.place, fmt::format("{}: write a name before AT", variable.location));
       }
       variables.push_back(std::move(variable));
     } while (take(","));
@@ -163,7 +191,7 @@ class ProjectReader {
     Configuration configuration{.name = "", .globals = {}, .resources = {}, .place = take().place};
     configuration.name = take_name("this CONFIGURATION");
     Resource own{.name = "", .globals = {}, .tasks = {}, .programs = {}, .place = configuration.place};
-    while (!at_end() && !take("END_CONFIGURATION")) {
+    while (!take_end("END_CONFIGURATION", configuration.name, configuration.place)) {
       if (at("RESOURCE")) {
         configuration.resources.push_back(read_resource());
       } else {
@@ -179,7 +207,7 @@ class ProjectReader {
     Resource resource{.name = "", .globals = {}, .tasks = {}, .programs = {}, .place = take().place};
     resource.name = take_name("this RESOURCE");
     if (take("ON")) take();
-    while (!at_end() && !at("END_CONFIGURATION") && !take("END_RESOURCE"))
+    while (!at("END_CONFIGURATION") && !take_end("END_RESOURCE", resource.name, resource.place))
       read_member(resource, resource.globals);
     return resource;
   }
@@ -255,7 +283,8 @@ class ProjectReader {
   // PROGRAM RETAIN main WITH fast : Main (in := start);
   void read_program(Resource& resource) {
     Program program{.name = "", .type = "", .task = "", .place = take().place};
-    if (!take("RETAIN")) take("NON_RETAIN");
+    program.retain = take("RETAIN");
+    take("NON_RETAIN");
     program.name = take_name("this instance of a PROGRAM");
     if (take("WITH")) program.task = take_name(fmt::format("the task of {}", program.name));
     if (expect(":", fmt::format("before the type of {}", program.name))) {
@@ -267,23 +296,22 @@ class ProjectReader {
   }
 
   void check(Resource& resource) {
+    if (resource.tasks.size() > kMostTasks) {
+      report(resource.tasks[kMostTasks].place, fmt::format("a RESOURCE has at most {} TASKs", kMostTasks));
+      resource.tasks.resize(kMostTasks);
+      return;
+    }
+    std::set<std::string> names;
+    for (const Task& task : resource.tasks) {
+      if (!names.insert(folded(task.name)).second)
+        report(task.place, fmt::format("there are two TASKs '{}'", task.name));
+    }
     for (const Program& program : resource.programs) {
-      const bool known = program.task.empty() || std::ranges::any_of(resource.tasks, [&](const Task& task) {
-                           return folded(task.name) == folded(program.task);
-                         });
-      if (!known) {
+      if (!program.task.empty() && !names.contains(folded(program.task))) {
         report(program.place,
                fmt::format("PROGRAM {} runs WITH '{}', and there is no such TASK in its resource",
                            program.name, program.task));
       }
-    }
-    std::vector<std::string> names;
-    for (const Task& task : resource.tasks) {
-      const std::string name = folded(task.name);
-      if (std::ranges::find(names, name) != names.end()) {
-        report(task.place, fmt::format("there are two TASKs '{}'", task.name));
-      }
-      names.push_back(name);
     }
   }
 
@@ -296,9 +324,13 @@ class ProjectReader {
 }  // namespace
 
 const Pou* Project::pou(std::string_view name) const {
-  const auto found =
-      std::ranges::find_if(pous, [&](const Pou& pou) { return folded(pou.name) == folded(name); });
-  return found == pous.end() ? nullptr : &*found;
+  const auto found = numbers_.find(folded(name));
+  return found == numbers_.end() ? nullptr : &pous[found->second];
+}
+
+void Project::add(Pou pou) {
+  numbers_.try_emplace(folded(pou.name), pous.size());
+  pous.push_back(std::move(pou));
 }
 
 ReadProject read_project(std::span<const Source> sources) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -31,6 +33,9 @@ struct Pou {
   Kind kind = Kind::program;
   std::string name;
   std::vector<Variable> variables;
+  /// The steps, transitions and actions of a sequential function chart, by name and in their order. Empty: it
+  /// is none.
+  std::string chart;
   SourcePlace place;
 };
 
@@ -48,12 +53,14 @@ struct Program {
   std::string type;
   std::string task;        ///< empty: it runs without one
   bool connected = false;  ///< variables stand in parentheses behind its type
+  bool retain = false;     ///< all its variables are retained
   SourcePlace place;
 };
 
-/// The name of a type that is declared in TYPE ... END_TYPE.
+/// A type that is declared in TYPE ... END_TYPE.
 struct DeclaredType {
   std::string name;
+  std::string definition;  ///< its words, folded, one blank apart
   SourcePlace place;
 };
 
@@ -72,12 +79,19 @@ struct Configuration {
   SourcePlace place;
 };
 
-struct Project {
+class Project {
+ public:
   std::vector<Pou> pous;
   std::vector<DeclaredType> types;
   std::vector<Configuration> configurations;
+  std::map<std::string, SourcePlace> locations;  ///< each %... in the sources, folded, where it stands first
 
+  /// The first one of this name.
   [[nodiscard]] const Pou* pou(std::string_view name) const;
+  void add(Pou pou);
+
+ private:
+  std::map<std::string, std::size_t> numbers_;  // of POUs, by their folded name
 };
 
 struct Source {

@@ -33,11 +33,13 @@ bool is_date(std::string_view type) noexcept {
 
 class Reader {
  public:
-  Reader(std::string_view text, const std::string& file) : text_(text) { place_ = {file, 1, 1}; }
+  Reader(std::string_view text, const std::string& file) : text_(text), position_(byte_order_mark(text)) {
+    place_ = {file, 1, 1};
+  }
 
   Tokens read() {
     while (skip_blanks()) tokens_.all.push_back(next());
-    tokens_.all.push_back({.kind = Token::Kind::end, .text = "", .place = place_});
+    tokens_.all.push_back({.kind = Token::Kind::end, .text = "", .place = place_, .offset = position_});
     return std::move(tokens_);
   }
 
@@ -70,10 +72,14 @@ class Reader {
       step_while([](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
       if (begins("(*")) {
         skip_comment("*)");
-      } else if (begins("/*")) {
-        skip_comment("*/");
-      } else if (begins("//")) {
-        step_while([](char c) { return c != '\n'; });
+      } else if (begins("/*") || begins("//")) {
+        const std::size_t begin = position_;
+        if (begins("/*")) {
+          skip_comment("*/");
+        } else {
+          step_while([](char c) { return c != '\n'; });
+        }
+        tokens_.new_comments.push_back({begin, position_ - begin});
       } else {
         return !at_end();
       }
@@ -91,7 +97,10 @@ class Reader {
     const SourcePlace place = place_;
     const std::size_t begin = position_;
     const Token::Kind kind = read_one();
-    return {.kind = kind, .text = std::string(text_.substr(begin, position_ - begin)), .place = place};
+    return {.kind = kind,
+            .text = std::string(text_.substr(begin, position_ - begin)),
+            .place = place,
+            .offset = begin};
   }
   Token::Kind read_one() {
     if (is_letter(at())) return read_name();
@@ -141,9 +150,10 @@ class Reader {
   }
   Token::Kind read_pragma() {
     const SourcePlace begin = place_;
-    step_while([](char c) { return c != '}'; });
-    if (at_end()) tokens_.problems.push_back({begin, "this pragma has no '}'"});
-    step();
+    const std::string_view close = begins("{{") ? "}}" : "}";
+    while (!at_end() && !begins(close)) step();
+    if (at_end()) tokens_.problems.push_back({begin, fmt::format("this pragma has no '{}'", close)});
+    step(close.size());
     return Token::Kind::pragma;
   }
 
@@ -157,6 +167,11 @@ class Reader {
 
 bool Token::is(std::string_view word) const noexcept {
   return (kind == Kind::name || kind == Kind::symbol) && same(text, word);
+}
+
+std::size_t byte_order_mark(std::string_view text) noexcept {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  return text.starts_with(kMark) ? kMark.size() : 0;
 }
 
 std::string folded(std::string_view name) {

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <ranges>
 #include <regex>
@@ -100,27 +99,10 @@ Result<Compiler> find_compiler(const std::string& folder) {
       "folder by --matiec or PLCHOST_MATIEC");
 }
 
-JoinedSource::JoinedSource(std::span<const iec::Source> sources) {
-  unsigned line = 1;
-  for (const iec::Source& source : sources) {
-    parts_.push_back({source.file, line});
-    text_ += source.text;
-    if (!text_.ends_with('\n')) text_ += '\n';
-    line += static_cast<unsigned>(std::ranges::count(source.text, '\n')) +
-            (source.text.ends_with('\n') ? 0U : 1U);
-  }
-}
-
-iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
-  const auto after = std::ranges::upper_bound(parts_, line, {}, &Part::first_line);
-  if (after == parts_.begin()) return {};
-  const Part& part = *std::prev(after);
-  return {part.file, line - part.first_line + 1, column};
-}
-
 iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
                                 const iec::Project& project, const std::string& library) {
-  static const std::regex form(R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning): (.*)$)");
+  static const std::regex form(
+      R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning)(?: while generating C code)?: (.*)$)");
   iec::SourceProblems problems;
   const auto add = [&](iec::SourceProblem problem) {
     if (std::ranges::find(problems, problem) == problems.end()) problems.push_back(std::move(problem));

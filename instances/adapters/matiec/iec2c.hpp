@@ -1,12 +1,11 @@
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/source_place.hpp"
+#include "instances/adapters/matiec/joined_source.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost::matiec {
@@ -21,23 +20,6 @@ struct Compiler {
 /// Looks in `folder` (of a built MATIEC, or where one is installed); empty: where PLCHOST_MATIEC says, else
 /// in PATH. The error says how to get one.
 [[nodiscard]] Result<Compiler> find_compiler(const std::string& folder);
-
-/// All sources one behind the other, as iec2c takes one file, and where each began.
-class JoinedSource {
- public:
-  explicit JoinedSource(std::span<const iec::Source> sources);
-  [[nodiscard]] const std::string& text() const noexcept { return text_; }
-  /// Of a line of the joined file.
-  [[nodiscard]] iec::SourcePlace place(unsigned line, unsigned column) const;
-
- private:
-  struct Part {
-    std::string file;
-    unsigned first_line;
-  };
-  std::vector<Part> parts_;
-  std::string text_;
-};
 
 /// The name of the joined file, in the folder in which iec2c runs.
 inline constexpr std::string_view kJoinedFile = "joined.st";

@@ -88,9 +88,10 @@ std::vector<Located> located_variables(std::string_view file) {
     std::vector<std::string> words;
     for (const auto word : std::views::split(line, ',')) words.emplace_back(word.begin(), word.end());
     if (words.size() < 5) continue;
-    std::string location = "%" + words[2] + words[3] + words[4];
+    // iec2c writes an S where no size stands in the source: %I0.3.
+    std::string location = "%" + words[2] + (words[3] == "S" ? "" : words[3]) + words[4];
     for (std::size_t i = 5; i < words.size(); ++i) location += "." + words[i];
-    result.push_back({.type = words[0], .name = words[1], .location = std::move(location)});
+    result.push_back({.type = iec::folded(words[0]), .name = words[1], .location = std::move(location)});
   }
   return result;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <compare>
 #include <expected>
 #include <string>
 #include <string_view>
@@ -13,7 +14,7 @@ struct Place {
   unsigned offset = 0;  ///< of its first byte
   unsigned bytes = 1;   ///< 1, 2, 4 or 8
   int bit = -1;         ///< 0 to 7; -1: whole bytes
-  bool operator==(const Place&) const = default;
+  auto operator<=>(const Place&) const = default;
 };
 
 /// The error says what is allowed.
@@ -21,7 +22,7 @@ struct Place {
 
 /// A line of LOCATED_VARIABLES.h.
 struct Located {
-  std::string type;      ///< of the value, in C and in IEC: INT
+  std::string type;      ///< of the value, in C and in IEC: INT; in upper case
   std::string name;      ///< of the pointer in C: __IW2
   std::string location;  ///< %IW2
 };
@@ -29,7 +30,7 @@ struct Located {
 /// Lines of another form are left out: iec2c ends the file with remains of other output.
 [[nodiscard]] std::vector<Located> located_variables(std::string_view file);
 
-/// Of an elementary type; 0: it is another one. BOOL has 1.
+/// Of an elementary type in upper case; 0: it is another one. BOOL has 1.
 [[nodiscard]] unsigned bytes_of_type(std::string_view type) noexcept;
 
 }  // namespace plchost::matiec

@@ -1,18 +1,28 @@
 /*
- * Between the two C files of an application that iec2c has translated: the one that `plcctl build
- * application` writes, in which the program and its types are, and application.c, which knows the runtime.
- * All names are in lower case: those of the program are in upper case, so none of them can be the same.
+ * Between the C files of an application that iec2c has translated: the one that `plcctl build application`
+ * writes, in which the program and its types are, and those that know the runtime: application.c, places.c
+ * and variables.c. All names are in lower case: those of the program are in upper case, so none of them can
+ * be the same.
  */
 #ifndef PLCHOST_MATIEC_H
 #define PLCHOST_MATIEC_H
 
 /* A located variable. Its value lies where the program has it, its bytes or its bit lie in an area. */
 struct plchost_place {
-  char area;           /* 'I', 'Q' or 'M' */
-  unsigned char bytes; /* 1, 2, 4 or 8 */
-  signed char bit;     /* 0 to 7; -1: whole bytes */
-  unsigned int offset; /* of the first byte in the area */
+  const char* name;
+  char area;             /* 'I', 'Q' or 'M' */
+  unsigned char bytes;   /* 1, 2, 4 or 8 */
+  signed char bit;       /* 0 to 7; -1: whole bytes */
+  unsigned char aliased; /* 1: another place has some of the same bits */
+  unsigned int offset;   /* of the first byte in the area */
   void* value;
+};
+
+/* A place that a task exchanges with its area. */
+struct plchost_use {
+  unsigned int place;
+  void* value; /* that of the place, or one of this task alone */
+  unsigned long long before;
 };
 
 struct plchost_task {
@@ -22,8 +32,18 @@ struct plchost_task {
   unsigned char (*edge)(void); /* of SINGLE; null: it has none */
   void (*run)(void);
   unsigned int uses_count;
-  const unsigned int* uses;     /* places */
-  unsigned long long* at_begin; /* the value of each of them when the cycle began */
+  struct plchost_use* uses;
+  unsigned int retained_count;
+  const unsigned int* retained; /* numbers among the retained variables */
+};
+
+/* A variable that is not located. */
+struct plchost_variable {
+  const char* path;
+  void* value;
+  unsigned int bytes;
+  unsigned long long layout; /* another one if its type is another one */
+  int retain;
 };
 
 /* From the file that plcctl writes. */
@@ -32,10 +52,26 @@ extern const unsigned int plchost_task_count;
 extern const struct plchost_task plchost_tasks[];
 extern const unsigned int plchost_place_count;
 extern const struct plchost_place plchost_places[];
+extern unsigned long long plchost_exchanged[]; /* for each place, in the memory area */
+void plchost_each_variable(void (*use)(const struct plchost_variable*));
+void plchost_bind(void); /* after config_init__() */
 void config_init__(void);
 
 /* From application.c: around each cycle of a task. */
 void plchost_begin(unsigned int task);
 void plchost_end(unsigned int task);
+
+/* From places.c. Declaring returns 0 if that fails. */
+int plchost_declare_places(void);
+void plchost_forget_places(void);
+void plchost_take_places(const struct plchost_task* task);
+void plchost_put_places(const struct plchost_task* task);
+/* The bit of a place in the memory area as it is now. Any thread. */
+unsigned char plchost_bit_now(unsigned int place);
+
+/* From variables.c. */
+int plchost_declare_variables(void);
+void plchost_forget_variables(void);
+void plchost_keep_retained(const struct plchost_task* task);
 
 #endif

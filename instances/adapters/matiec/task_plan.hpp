@@ -8,6 +8,7 @@
 
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/source_place.hpp"
+#include "instances/adapters/matiec/located.hpp"
 
 namespace plchost::matiec {
 
@@ -18,7 +19,7 @@ struct PlannedTask {
   std::int64_t interval_ns = 0;               ///< 0: freewheeling, or `single`
   std::string single;                         ///< the variable of the edge; empty: none
   std::vector<const iec::Program*> programs;  ///< in the order of the source
-  std::set<std::string> locations;            ///< of the located variables that they use
+  std::set<Place> places;                     ///< of the located variables that they use
   std::set<std::string> globals;              ///< that they use, folded
   iec::SourcePlace place;
 };
@@ -27,6 +28,8 @@ struct TaskPlan {
   std::vector<PlannedTask> tasks;
   /// Those that all programs of the resource see, by their folded name; of one name that of the resource.
   std::map<std::string, const iec::Variable*> globals;
+  /// All located variables of the project, in the order of the source.
+  std::map<Place, std::vector<const iec::Variable*>> located;
   iec::SourceProblems problems;
   iec::SourceProblems remarks;
 };

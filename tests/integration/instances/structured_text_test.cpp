@@ -2,6 +2,7 @@
 // Structured Text.
 #include <array>
 #include <chrono>
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -62,6 +63,74 @@ CONFIGURATION cell
 END_CONFIGURATION
 )";
 
+constexpr const char* kCounting = R"(
+PROGRAM Main
+  VAR RETAIN total : DINT := 100; of_shift : ARRAY[0..2] OF INT; END_VAR
+  VAR fresh : DINT; END_VAR
+  VAR
+    held AT %QX10.0 : BOOL;
+    go AT %IX0.0 : BOOL;
+    total_out AT %QD0 : DINT;
+    fresh_out AT %QD1 : DINT;
+    shift_out AT %QW4 : INT;
+  END_VAR
+  IF go THEN held := TRUE; END_IF;
+  total := total + 1;
+  fresh := fresh + 1;
+  of_shift[1] := of_shift[1] + 1;
+  total_out := total;
+  fresh_out := fresh;
+  shift_out := of_shift[1];
+END_PROGRAM
+CONFIGURATION cell
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM one WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+// A task that others interrupt after it has written, and before it puts out.
+constexpr const char* kInterrupted = R"(
+PROGRAM Slow
+  VAR_EXTERNAL flag : BOOL; lamp : BOOL; END_VAR
+  VAR mine : BOOL; i : DINT; work : DINT; END_VAR
+  VAR go AT %IX0.0 : BOOL; lost AT %QD1 : DINT; cycles AT %QD2 : DINT; END_VAR
+  IF flag <> mine OR lamp <> mine THEN lost := lost + 1; END_IF;
+  mine := NOT mine;
+  flag := mine;
+  lamp := mine;
+  FOR i := 0 TO 500000 DO work := work + i; END_FOR;
+  cycles := cycles + 1;
+END_PROGRAM
+PROGRAM Fast
+  VAR_EXTERNAL flag : BOOL; lamp : BOOL; END_VAR
+  VAR seen AT %QX0.1 : BOOL; cycles AT %QD3 : DINT; END_VAR
+  seen := flag AND lamp;
+  cycles := cycles + 1;
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL flag AT %MX0.0 : BOOL; lamp AT %QX0.0 : BOOL; END_VAR
+  RESOURCE press ON PLC
+    TASK quick (INTERVAL := T#1ms, PRIORITY := 1);
+    TASK idle (INTERVAL := T#5ms, PRIORITY := 5);
+    PROGRAM one WITH quick : Fast;
+    PROGRAM two WITH idle : Slow;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+struct Interrupted {
+  std::uint8_t bits = 0, unused[3]{};
+  std::int32_t lost = 0, slow = 0, fast = 0;
+};
+
+struct Counted {
+  std::int32_t total = 0, fresh = 0;
+  std::int16_t of_shift = 0;
+  std::uint8_t held = 0, unused = 0;
+};
+
 struct ImageIn {
   std::uint8_t bits = 0, unused = 0;
   std::int16_t raw = 0;
@@ -81,12 +150,17 @@ class StructuredText : public ::testing::Test {
     remove_pool_memories(sandbox.pool());
   }
 
-  void start(const std::string& application) {
+  void start(const std::string& application, const std::string& kind = "first") {
+    plc_image_close(&inputs_);
+    plc_image_close(&outputs_);
+    sut.reset();
     const std::string settings =
         sandbox.write("line1.cfg",
                       "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=in\nLinux.Area.0.Size=64\n"
                       "Linux.Area.1.Flags=0x8\nLinux.Area.1.Object=out\nLinux.Area.1.Size=64\n");
-    sut.emplace(sandbox, std::vector<std::string>{"--settings", settings, "--application", application});
+    sut.emplace(sandbox, std::vector<std::string>{"--settings", settings, "--application", application,
+                                                  "--state-directory", sandbox.folder() + "/state",
+                                                  "--start-kind", kind});
     sut->wait_until_up();
     ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", 64, PLC_IMAGE_WRITE, &inputs_), 0);
     ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", 64, PLC_IMAGE_READ, &outputs_), 0);
@@ -96,10 +170,11 @@ class StructuredText : public ::testing::Test {
     std::memcpy(bytes.data(), &inputs, sizeof inputs);
     plc_image_write(&inputs_, bytes.data());
   }
-  ImageOut outputs() {
+  template <class Image = ImageOut>
+  Image outputs() {
     std::array<char, 64> bytes{};
     EXPECT_EQ(plc_image_read(&outputs_, bytes.data(), nullptr), PLC_IMAGE_OK);
-    ImageOut outputs;
+    Image outputs;
     std::memcpy(&outputs, bytes.data(), sizeof outputs);
     return outputs;
   }
@@ -127,12 +202,12 @@ class StructuredText : public ::testing::Test {
     const char* const folder = std::getenv("PLCHOST_MATIEC");  // NOLINT(concurrency-mt-unsafe)
     return folder == nullptr ? "" : folder;
   }
-  ProgramEnd build(const std::string& text) const {
-    return run_program({PLCCTL, "build", "application", sandbox.write("twice.st", text), "-o",
-                        sandbox.folder() + "/twice.so"},
+  ProgramEnd build(const std::string& text, const std::string& name = "twice") const {
+    return run_program({PLCCTL, "build", "application", sandbox.write(name + ".st", text), "-o", so(name)},
                        sandbox.folder())
         .value();
   }
+  std::string so(const std::string& name) const { return sandbox.folder() + "/" + name + ".so"; }
 
   Sandbox sandbox;
   std::optional<InstanceProcess> sut;
@@ -155,6 +230,70 @@ TEST_F(StructuredText, ThatMatiecTranslatesRunsAsItIsWritten) {
   EXPECT_THAT(built.output, HasSubstr("PROGRAM rest has no TASK: it runs freewheeling"));
   start(sandbox.folder() + "/twice.so");
   expect_it_works();
+}
+
+TEST_F(StructuredText, ThatRetainsVariablesHasThemAfterARestart) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  const ProgramEnd built = build(kCounting, "counting");
+  ASSERT_TRUE(built.success()) << built.output;
+  start(so("counting"));
+  EXPECT_TRUE(eventually([&] { return outputs<Counted>().total > 120; }))
+      << "it begins with its initial value";
+  const auto before = outputs<Counted>();
+  EXPECT_EQ(before.total, before.fresh + 100);
+  sut->end(SIGKILL);
+  start(so("counting"), "after-fault");
+  EXPECT_TRUE(eventually([&] { return outputs<Counted>().fresh > 5; }));
+  const auto after = outputs<Counted>();
+  EXPECT_GE(after.total, before.total + after.fresh);
+  EXPECT_GE(after.of_shift, before.of_shift + after.fresh);
+  EXPECT_EQ(after.total - 100, after.of_shift);
+  sut->end(SIGKILL);
+  start(so("counting"), "cold");
+  EXPECT_TRUE(eventually([&] { return outputs<Counted>().fresh > 5; }));
+  const auto cold = outputs<Counted>();
+  EXPECT_EQ(cold.total, cold.fresh + 100);
+}
+
+TEST_F(StructuredText, ThatIsInterruptedLosesNothingThatItWrote) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  const ProgramEnd built = build(kInterrupted, "interrupted");
+  ASSERT_TRUE(built.success()) << built.output;
+  EXPECT_THAT(built.output, HasSubstr("the tasks quick, idle use flag and can pre-empt each other"));
+  start(so("interrupted"));
+  EXPECT_TRUE(eventually([&] { return outputs<Interrupted>().slow > 300; }));
+  EXPECT_EQ(outputs<Interrupted>().lost, 0);
+  EXPECT_GT(outputs<Interrupted>().fast, 300);
+}
+
+TEST_F(StructuredText, ThatIsChangedOnlineGoesOnWithItsValues) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  ASSERT_TRUE(build(kCounting, "counting").success());
+  std::string text = kCounting;
+  text.replace(text.find("total + 1;"), 10, "total + 1000;");
+  text.replace(text.find("VAR fresh"), 3, "VAR more : DINT := 7;");
+  const ProgramEnd built = build(text, "faster");
+  ASSERT_TRUE(built.success()) << built.output;
+  start(so("counting"));
+  put({.bits = 1});
+  EXPECT_TRUE(eventually([&] { return outputs<Counted>().held == 1; }));
+  put({.bits = 0});
+  EXPECT_TRUE(eventually([&] { return outputs<Counted>().fresh > 20; }));
+  const auto before = outputs<Counted>();
+  const ControlReply reply = sut->ask(ControlVerb::change_application, so("faster"));
+  EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  EXPECT_TRUE(eventually([&] { return outputs<Counted>().total > before.total + 5000; }));
+  const auto after = outputs<Counted>();
+  EXPECT_EQ(after.held, 1) << "an output keeps what the program had put there";
+  EXPECT_GT(after.fresh, before.fresh);
+  EXPECT_EQ(after.of_shift, after.fresh);
+  text.replace(text.find("fresh : DINT"), 12, "fresh : REAL");
+  text.replace(text.find("fresh + 1"), 9, "fresh + 1.0");
+  text.replace(text.find(":= fresh;"), 9, ":= REAL_TO_DINT(fresh);");
+  ASSERT_TRUE(build(text, "other").success());
+  const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
+  EXPECT_EQ(refused.code, ErrorCode::refused);
+  EXPECT_THAT(refused.text, HasSubstr("variables 'ONE.FRESH': qwLayout is"));
 }
 
 TEST_F(StructuredText, ThatIsWrongIsToldInItsOwnWords) {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 namespace plchost::matiec {
@@ -35,6 +36,7 @@ class MatiecGlue : public testing::Test {
   static constexpr const char* kMain =
       "PROGRAM Main VAR_EXTERNAL go : BOOL; END_VAR VAR raw AT %IW2 : INT; END_VAR END_PROGRAM";
   static constexpr const char* kGo = "VAR_GLOBAL go : BOOL; END_VAR";
+  static constexpr const char* kIdle = "TASK idle (INTERVAL := T#1s, PRIORITY := 31); ";
   static constexpr const char* kFast = "TASK fast (INTERVAL := T#10ms, PRIORITY := 1);";
 };
 
@@ -58,22 +60,26 @@ TEST_F(MatiecGlue, GivesATaskThePlacesThatItsProgramsUse) {
                 "PROGRAM one WITH fast : Main; PROGRAM two WITH slow : Other;",
             {{"INT", "__IW2", "%IW2"}, {"BOOL", "__QX0_1", "%QX0.1"}, {"BOOL", "__IX0_0", "%IX0.0"}});
   EXPECT_THAT(texts(glue.problems), IsEmpty());
-  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_0[] = {0, 2, 0}"));
-  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1[] = {1, 0}"));
-  EXPECT_THAT(glue.text, HasSubstr("{'I', 2, -1, 4u, &plchost_value_0}"));
-  EXPECT_THAT(glue.text, HasSubstr("{'Q', 1, 1, 0u, &plchost_value_1}"));
+  EXPECT_THAT(
+      glue.text,
+      HasSubstr("plchost_uses_0[] = {\n  {0, &plchost_value_0, 0},\n  {2, &plchost_value_2, 0},\n  {0}}"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1[] = {\n  {1, &plchost_value_1, 0},\n  {0}}"));
+  EXPECT_THAT(glue.text, HasSubstr("{\"__IW2\", 'I', 2, -1, 0, 4u, &plchost_value_0}"));
+  EXPECT_THAT(glue.text, HasSubstr("{\"__QX0_1\", 'Q', 1, 1, 0, 0u, &plchost_value_1}"));
 }
 
 TEST_F(MatiecGlue, MakesAnEventTaskOfSingle) {
   const Glue glue =
-      write(kMain, kGo, "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;");
+      write(kMain, kGo,
+            std::string(kIdle) + "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;");
   EXPECT_THAT(texts(glue.problems), IsEmpty());
   EXPECT_THAT(glue.text, HasSubstr("plchost_edge_0(void) { return *__GET_GLOBAL_GO(); }"));
   EXPECT_THAT(glue.text, HasSubstr("{\"edge\", 0, 0L, plchost_edge_0,"));
 }
 
 TEST_F(MatiecGlue, SaysWhatWouldNeverRelease) {
-  const std::string edge = "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;";
+  const std::string edge =
+      std::string(kIdle) + "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;";
   const std::string input = "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR";
   const std::vector<Located> located{{"BOOL", "__IX0_0", "%IX0.0"}};
   EXPECT_THAT(texts(write(kMain, input, edge, located).problems),
@@ -81,7 +87,12 @@ TEST_F(MatiecGlue, SaysWhatWouldNeverRelease) {
   EXPECT_THAT(texts(write(kMain, input, edge + kFast + "PROGRAM two WITH fast : Main;", located).problems),
               IsEmpty());
   EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL go : INT; END_VAR", edge).problems),
-              ElementsAre("c.st:4:1: SINGLE of edge: 'go' is no BOOL of a VAR_GLOBAL"));
+              ElementsAre("c.st:4:47: SINGLE of edge: 'go' is no BOOL of a VAR_GLOBAL"));
+}
+
+TEST_F(MatiecGlue, WantsATaskWithAnInterval) {
+  EXPECT_THAT(texts(write(kMain, kGo, "PROGRAM one : Main;").problems),
+              ElementsAre(HasSubstr("no TASK of this CONFIGURATION has an INTERVAL, and iec2c needs one")));
 }
 
 TEST_F(MatiecGlue, RunsAProgramWithoutATaskFreewheelingAndSaysSo) {
@@ -113,14 +124,15 @@ TEST_F(MatiecGlue, SaysWhatTheCompilerCannotDoAndWhatIsDropped) {
                               "TASK idle (INTERVAL := T#1s, PRIORITY := 2); PROGRAM one WITH fast : Main;")
                         .remarks),
               ElementsAre(HasSubstr("TASK idle runs no program, so it is left out")));
-  EXPECT_THAT(texts(write("PROGRAM Main VAR RETAIN a, b : INT; END_VAR END_PROGRAM", "",
-                          std::string(kFast) + "PROGRAM one WITH fast : Main;")
+  EXPECT_THAT(texts(write("PROGRAM Main VAR RETAIN a AT %QB0 : BYTE; END_VAR END_PROGRAM", "",
+                          std::string(kFast) + "PROGRAM one WITH fast : Main;", {{"BYTE", "__QB0", "%QB0"}})
                         .remarks),
-              ElementsAre(HasSubstr("RETAIN of a, b in Main is not carried out")));
+              ElementsAre(HasSubstr("RETAIN of a at %QB0 is not carried out")));
   EXPECT_THAT(
       texts(write(kMain, kGo, "TASK fast (INTERVAL := T#10ns, PRIORITY := 1); PROGRAM one WITH fast : Main;")
                 .problems),
-      ElementsAre(HasSubstr("allowed are whole microseconds up to 50 days")));
+      ElementsAre(HasSubstr(
+          "allowed are whole microseconds up to 71 minutes, and whole milliseconds up to 49 days")));
 }
 
 TEST_F(MatiecGlue, RefusesTwoThingsOfOneName) {
@@ -138,6 +150,101 @@ TEST_F(MatiecGlue, RefusesATypeThatDoesNotFitIntoItsPlace) {
   const Glue glue = write(kMain, "VAR_GLOBAL go AT %IW0 : BOOL; END_VAR",
                           std::string(kFast) + "PROGRAM one WITH fast : Main;", {{"BOOL", "__IW0", "%IW0"}});
   EXPECT_THAT(texts(glue.problems), ElementsAre("c.st:2:12: BOOL does not fit into %IW0"));
+}
+
+TEST_F(MatiecGlue, RefusesIntervalsThatTheInterfaceCannotHold) {
+  for (const char* interval : {"T#50d", "T#4800000.001ms"}) {
+    EXPECT_THAT(
+        texts(write(kMain, kGo,
+                    fmt::format("TASK fast (INTERVAL := {}, PRIORITY := 1); PROGRAM one WITH fast : Main;",
+                                interval))
+                  .problems),
+        ElementsAre(HasSubstr("INTERVAL of fast: allowed are whole microseconds")))
+        << interval;
+  }
+}
+
+TEST_F(MatiecGlue, PutsOutTheOtherBitsOfItsBytesSinceAByteIsThatOfTheTaskThatChangedItLast) {
+  const Glue glue = write(
+      "PROGRAM A VAR a AT %QX0.0 : BOOL; END_VAR END_PROGRAM PROGRAM B VAR b AT %QX0.1 : BOOL; c AT %QX1.0 : "
+      "BOOL; "
+      "END_VAR END_PROGRAM",
+      "",
+      std::string(kFast) +
+          "TASK slow (INTERVAL := T#1s, PRIORITY := 5); PROGRAM one WITH fast : A; PROGRAM two WITH slow : "
+          "B;",
+      {{"BOOL", "__QX0_0", "%QX0.0"}, {"BOOL", "__QX0_1", "%QX0.1"}, {"BOOL", "__QX1_0", "%QX1.0"}});
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(
+      glue.text,
+      HasSubstr("plchost_uses_0[] = {\n  {0, &plchost_value_0, 0},\n  {1, &plchost_value_1, 0},\n  {0}}"));
+}
+
+TEST_F(MatiecGlue, RefusesOutputsThatShareBitsInTwoTasks) {
+  const std::vector<Located> located{{"BYTE", "__QB0", "%QB0"}, {"BOOL", "__QX0_1", "%QX0.1"}};
+  const std::string programs =
+      "PROGRAM A VAR a AT %QB0 : BYTE; END_VAR END_PROGRAM PROGRAM B VAR b AT %QX0.1 : BOOL; END_VAR "
+      "END_PROGRAM";
+  const std::string slow = "TASK slow (INTERVAL := T#1s, PRIORITY := 5); PROGRAM one WITH fast : A; ";
+  EXPECT_THAT(texts(write(programs, "", kFast + slow + "PROGRAM two WITH slow : B;", located).problems),
+              ElementsAre(HasSubstr(
+                  "%QX0.1 and %QB0 share bits, and the tasks fast, slow use them: use both in one task")));
+  const Glue one = write(programs, "", kFast + slow + "PROGRAM two WITH fast : B;", located);
+  EXPECT_THAT(texts(one.problems), IsEmpty());
+  EXPECT_THAT(one.text, HasSubstr("{\"__QB0\", 'Q', 1, -1, 1, 0u, &plchost_value_0}"));
+}
+
+TEST_F(MatiecGlue, GivesEachTaskItsOwnValueOfAnInputOfItsPrograms) {
+  const std::string slow =
+      "TASK slow (INTERVAL := T#1s, PRIORITY := 5); PROGRAM one WITH fast : Main; PROGRAM two WITH slow : "
+      "Main;";
+  const Glue glue = write(kMain, kGo, kFast + slow, {{"INT", "__IW2", "%IW2"}});
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_input_0_0, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_input_1_0, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("  __IW2 = &plchost_input_1_0;\n  MAIN_init__(&PRESS__TWO, 0);\n"));
+}
+
+TEST_F(MatiecGlue, SaysWhichLocationsItHasNotUnderstood) {
+  const Glue glue = write("PROGRAM Main raw AT %IW2 : INT; END_VAR END_PROGRAM", "",
+                          std::string(kFast) + "PROGRAM one WITH fast : Main;", {{"INT", "__IW2", "%IW2"}});
+  EXPECT_THAT(texts(glue.problems),
+              ElementsAre("a.st:1:21: %IW2: the declaration around it is not understood"));
+}
+
+TEST_F(MatiecGlue, NamesAllVariablesOfItsProgramsAndTheirBlocks) {
+  const Glue glue = write(
+      "TYPE Point : STRUCT x : INT; END_STRUCT; END_TYPE "
+      "FUNCTION_BLOCK Pump VAR_INPUT on : BOOL; END_VAR VAR hours : DINT; late : TON; END_VAR VAR_TEMP t : "
+      "INT; END_VAR "
+      "VAR_IN_OUT p : INT; END_VAR END_FUNCTION_BLOCK "
+      "PROGRAM Main VAR RETAIN count : DINT; END_VAR VAR pump : Pump; spot : Point; m : INT; END_VAR "
+      "VAR CONSTANT most : INT := 3; END_VAR VAR_EXTERNAL go : BOOL; END_VAR END_PROGRAM",
+      "VAR_GLOBAL RETAIN go : BOOL; END_VAR", std::string(kFast) + "PROGRAM m WITH fast : Main;");
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(glue.text, HasSubstr("v.path = \"M.COUNT\"; v.value = &PRESS__M.COUNT.value; v.bytes = sizeof "
+                                   "PRESS__M.COUNT.value;"));
+  EXPECT_THAT(glue.text, HasSubstr("&PRESS__M.PUMP.ON.value;"));
+  EXPECT_THAT(glue.text, HasSubstr("&PRESS__M.PUMP.LATE;"));
+  EXPECT_THAT(glue.text, HasSubstr("&PRESS__M.SPOT.value;"));
+  EXPECT_THAT(glue.text, HasSubstr("&*__GET_GLOBAL_GO();"));
+  EXPECT_THAT(glue.text, HasSubstr("#undef M\n")) << "the resource's macro for the instance";
+  for (const char* nothing : {"PUMP.T.", "PUMP.P", "MOST", "M.GO"})
+    EXPECT_THAT(glue.text, Not(HasSubstr(nothing)));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_retained_0[] = {0, 1, 0};"));
+}
+
+TEST_F(MatiecGlue, HasAnotherLayoutIfATypeInItChanges) {
+  const auto layout = [&](const std::string& type) {
+    const Glue glue = write("TYPE Point : STRUCT x : " + type +
+                                "; END_STRUCT; Path : ARRAY[1..2] OF Point; END_TYPE "
+                                "PROGRAM Main VAR way : Path; END_VAR END_PROGRAM",
+                            "", std::string(kFast) + "PROGRAM m WITH fast : Main;");
+    const std::size_t at = glue.text.find("v.layout = ");
+    return glue.text.substr(at, glue.text.find(';', at) - at);
+  };
+  EXPECT_EQ(layout("INT"), layout("int"));
+  EXPECT_NE(layout("INT"), layout("WORD"));
 }
 
 TEST_F(MatiecGlue, LeavesTheOtherResourcesToTheirApplications) {

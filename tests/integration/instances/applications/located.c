@@ -12,22 +12,17 @@ static unsigned char byte;
 const char plchost_application_name[] = "located";
 const unsigned int plchost_place_count = 10;
 const struct plchost_place plchost_places[] = {
-    {'I', 1, 0, 0, &go},     /* %IX0.0 */
-    {'I', 2, -1, 2, &raw},   /* %IW1 */
-    {'Q', 1, 1, 0, &lamp},   /* %QX0.1 */
-    {'Q', 1, -1, 0, &byte},  /* %QB0, the byte around it */
-    {'Q', 2, -1, 2, &twice}, /* %QW1 */
-    {'Q', 1, -1, 4, &edges}, /* %QB4 */
-    {'Q', 1, -1, 5, &copy},  /* %QB5 */
-    {'M', 1, 3, 0, &flag},   /* %MX0.3 */
-    {'Q', 1, -1, 6, &loops}, /* %QB6 */
-    {'Q', 1, -1, 7, &preset} /* %QB7 */
-};
+    {"__IX0_0", 'I', 1, 0, 0, 0, &go},   {"__IW1", 'I', 2, -1, 0, 2, &raw},
+    {"__QX0_1", 'Q', 1, 1, 1, 0, &lamp}, {"__QB0", 'Q', 1, -1, 1, 0, &byte},
+    {"__QW1", 'Q', 2, -1, 0, 2, &twice}, {"__QB4", 'Q', 1, -1, 0, 4, &edges},
+    {"__QB5", 'Q', 1, -1, 0, 5, &copy},  {"__MX0_3", 'M', 1, 3, 0, 0, &flag},
+    {"__QB6", 'Q', 1, -1, 0, 6, &loops}, {"__QB7", 'Q', 1, -1, 0, 7, &preset}};
+unsigned long long plchost_exchanged[10];
 
-static const unsigned int of_fast[] = {0, 1, 2, 3, 4, 6, 7, 9};
-static const unsigned int of_edge[] = {5};
-static const unsigned int of_loop[] = {7, 8};
-static unsigned long long at_begin_of_fast[8], at_begin_of_edge[1], at_begin_of_loop[2];
+static struct plchost_use of_fast[] = {{0, &go, 0},    {1, &raw, 0},  {2, &lamp, 0}, {3, &byte, 0},
+                                       {4, &twice, 0}, {6, &copy, 0}, {7, &flag, 0}, {9, &preset, 0}};
+static struct plchost_use of_edge[] = {{5, &edges, 0}};
+static struct plchost_use of_loop[] = {{7, &flag, 0}, {8, &loops, 0}};
 
 static void run_fast(void) {
   plchost_begin(0);
@@ -52,8 +47,12 @@ static void run_loop(void) {
 }
 
 const unsigned int plchost_task_count = 3;
-const struct plchost_task plchost_tasks[] = {{"fast", 1, 2000000L, 0, run_fast, 8, of_fast, at_begin_of_fast},
-                                             {"edge", 0, 0, edge, run_edge, 1, of_edge, at_begin_of_edge},
-                                             {"loop", 31, 0, 0, run_loop, 2, of_loop, at_begin_of_loop}};
+const struct plchost_task plchost_tasks[] = {{"fast", 1, 2000000L, 0, run_fast, 8, of_fast, 0, 0},
+                                             {"edge", 0, 0, edge, run_edge, 1, of_edge, 0, 0},
+                                             {"loop", 31, 0, 0, run_loop, 2, of_loop, 0, 0}};
 
+void plchost_each_variable(void (*use)(const struct plchost_variable*)) {
+  (void)use;
+}
+void plchost_bind(void) {}
 void config_init__(void) {}

@@ -1,0 +1,106 @@
+#include "instances/adapters/matiec/joined_source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <iterator>
+#include <span>
+#include <string_view>
+
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost::matiec {
+
+namespace {
+
+using iec::Token;
+
+// Any other pragma is C for iec2c, or one of its own: {{ x = 1; }}, {disable code generation}.
+bool is_of_other_tools(const Token& token) {
+  if (token.kind != Token::Kind::pragma || token.text.starts_with("{{")) return false;
+  constexpr std::array<std::string_view, 9> kWords{"ATTRIBUTE", "REGION", "ENDREGION", "ANALYSIS", "FLAG",
+                                                   "INFO",      "TEXT",   "WARNING",   "ERROR"};
+  const std::string text = iec::folded(token.text);
+  const auto is_letter = [](char c) { return c >= 'A' && c <= 'Z'; };
+  const auto begin = std::ranges::find_if(text, is_letter);
+  const std::string_view word(begin, std::find_if_not(begin, text.end(), is_letter));
+  return std::ranges::find(kWords, word) != kWords.end();
+}
+
+void blank(std::string& text, std::size_t offset, std::size_t bytes) {
+  for (char& c : std::span(text).subspan(offset, bytes)) {
+    if (c != '\n' && c != '\r') c = ' ';
+  }
+}
+
+bool is_unknown_to_iec2c(const Token& interval) {
+  if (interval.kind != Token::Kind::literal) return false;
+  const std::string text = iec::folded(interval.text);
+  return text.starts_with('L') || text.contains("US") || text.contains("NS");
+}
+
+// Of the tasks in a configuration: an INTERVAL elsewhere may be the name of a variable.
+class IntervalFinder {
+ public:
+  /// Of each token, in the order of the source.
+  [[nodiscard]] bool is_interval(const Token& token) {
+    if (token.is("CONFIGURATION")) in_configuration_ = true;
+    if (token.is("END_CONFIGURATION")) in_configuration_ = false;
+    if (token.is("TASK")) in_task_ = in_configuration_;
+    if (token.is(")") || token.is(";")) in_task_ = false;
+    const bool result = in_task_ && behind_ == 2;
+    if (token.is("INTERVAL")) {
+      behind_ = 1;
+    } else {
+      behind_ = behind_ == 1 && token.is(":=") ? 2 : 0;
+    }
+    return result;
+  }
+
+ private:
+  bool in_configuration_ = false;
+  bool in_task_ = false;
+  int behind_ = 0;  // 1: INTERVAL, 2: INTERVAL :=
+};
+
+std::string for_iec2c(const iec::Source& source) {
+  constexpr std::string_view kAnyInterval = "T#1ms";
+  std::string text = source.text;
+  const iec::Tokens tokens = iec::tokens_of(text, source.file);
+  for (const iec::Stretch& comment : tokens.new_comments) blank(text, comment.offset, comment.bytes);
+  IntervalFinder intervals;
+  for (const Token& token : tokens.all) {
+    const bool is_interval = intervals.is_interval(token);
+    if (is_of_other_tools(token)) {
+      blank(text, token.offset, token.text.size());
+    } else if (token.kind == Token::Kind::place) {
+      text.replace(token.offset, token.text.size(), iec::folded(token.text));
+    } else if (is_interval && is_unknown_to_iec2c(token) && token.text.size() >= kAnyInterval.size()) {
+      blank(text, token.offset, token.text.size());
+      text.replace(token.offset, kAnyInterval.size(), kAnyInterval);
+    }
+  }
+  return text.substr(iec::byte_order_mark(text));
+}
+
+}  // namespace
+
+JoinedSource::JoinedSource(std::span<const iec::Source> sources) {
+  unsigned line = 1;
+  for (const iec::Source& source : sources) {
+    parts_.push_back({source.file, line});
+    const std::string text = for_iec2c(source);
+    text_ += text;
+    if (!text.ends_with('\n')) text_ += '\n';
+    line += static_cast<unsigned>(std::ranges::count(text, '\n')) + (text.ends_with('\n') ? 0U : 1U);
+  }
+}
+
+iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
+  const auto after = std::ranges::upper_bound(parts_, line, {}, &Part::first_line);
+  if (after == parts_.begin()) return {};
+  const Part& part = *std::prev(after);
+  return {part.file, line - part.first_line + 1, column};
+}
+
+}  // namespace plchost::matiec

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/source_place.hpp"
+
+namespace plchost::matiec {
+
+/// All sources one behind the other, as iec2c takes one file, and where each began. What iec2c does not take,
+/// and what means nothing to it, is replaced without moving any other word: comments of the third edition,
+/// pragmas of other tools, the mark of UTF-8, locations in lower case, and intervals in units that it does
+/// not know (it needs only that there is one).
+class JoinedSource {
+ public:
+  explicit JoinedSource(std::span<const iec::Source> sources);
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+  /// Of a line of the joined file.
+  [[nodiscard]] iec::SourcePlace place(unsigned line, unsigned column) const;
+
+ private:
+  struct Part {
+    std::string file;
+    unsigned first_line;
+  };
+  std::vector<Part> parts_;
+  std::string text_;
+};
+
+}  // namespace plchost::matiec
