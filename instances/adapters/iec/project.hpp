@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "instances/adapters/iec/source_place.hpp"
+#include "instances/adapters/iec/task_extension.hpp"
 
 namespace plchost::iec {
 
@@ -40,6 +41,7 @@ struct Task {
   std::string single;                       ///< the variable whose rising edge releases it; empty: none
   int priority = 0;                         ///< 0 is the highest
   SourcePlace place;
+  TaskExtension extension = {};
 };
 
 /// An instance of a program.
@@ -49,6 +51,7 @@ struct Program {
   std::string task;        ///< empty: it runs without one
   bool connected = false;  ///< variables stand in parentheses behind its type
   SourcePlace place;
+  TaskExtension extension = {};  ///< of its own task, if it runs without one
 };
 
 /// The name of a type that is declared in TYPE ... END_TYPE.

@@ -1,6 +1,7 @@
 #include "instances/adapters/matiec/glue.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <utility>
 
@@ -108,6 +109,15 @@ class Writer {
             folded(task.single));
     }
     use_counts_.push_back(uses.size());
+    if (task.extension.options) write_options(*task.extension.options, number);
+  }
+  void write_options(const TaskOptions& options, std::size_t number) {
+    using std::chrono::microseconds;
+    const TaskWatchdog& watchdog = options.watchdog;
+    print("static const struct plchost_options plchost_options_{} = {{{}L, {}, {}, {}u, {}u, {}u, {}}};\n",
+          number, options.start_offset.count(), std::to_underlying(options.late),
+          options.drives_outputs ? 1 : 0, watchdog.time / microseconds(1), watchdog.sensitivity,
+          watchdog.omitted_cycles, std::to_underlying(watchdog.policy));
   }
 
   void write_tasks() {
@@ -115,9 +125,14 @@ class Writer {
           plan_.tasks.size());
     for (std::size_t i = 0; i < plan_.tasks.size(); ++i) {
       const PlannedTask& task = plan_.tasks[i];
-      print("  {{\"{0}\", {1}, {2}L, {3}, plchost_run_{4}, {5}, plchost_uses_{4}, plchost_at_begin_{4}}},\n",
-            task.name, task.priority, task.interval_ns,
-            task.single.empty() ? "0" : fmt::format("plchost_edge_{}", i), i, use_counts_[i]);
+      const std::string& event = task.extension.external_event;
+      print(
+          "  {{\"{0}\", {1}, {2}L, {3}, plchost_run_{4}, {5}, plchost_uses_{4}, plchost_at_begin_{4}, {6}, "
+          "{7}}},\n",
+          task.name, task.priority, task.interval_ns,
+          task.single.empty() ? "0" : fmt::format("plchost_edge_{}", i), i, use_counts_[i],
+          event.empty() ? "0" : fmt::format("\"{}\"", event),
+          task.extension.options ? fmt::format("&plchost_options_{}", i) : "0");
     }
     print("}};\n");
   }

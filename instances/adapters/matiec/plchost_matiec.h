@@ -15,6 +15,17 @@ struct plchost_place {
   void* value;
 };
 
+/* Options that IEC 61131-3 does not have; the ranges are those of Task_Options in plc_app.h. */
+struct plchost_options {
+  long start_offset_ns;
+  short late_policy; /* PLC_LATE_... */
+  unsigned char drives_outputs;
+  unsigned int watchdog_time_us;
+  unsigned int watchdog_sensitivity;
+  unsigned int watchdog_omitted_cycles;
+  short watchdog_policy; /* PLC_WATCHDOG_... */
+};
+
 struct plchost_task {
   const char* name;
   short priority;
@@ -22,8 +33,10 @@ struct plchost_task {
   unsigned char (*edge)(void); /* of SINGLE; null: it has none */
   void (*run)(void);
   unsigned int uses_count;
-  const unsigned int* uses;     /* places */
-  unsigned long long* at_begin; /* the value of each of them when the cycle began */
+  const unsigned int* uses;              /* places */
+  unsigned long long* at_begin;          /* the value of each of them when the cycle began */
+  const char* external_event;            /* each post runs it; null: none does */
+  const struct plchost_options* options; /* null: the defaults */
 };
 
 /* From the file that plcctl writes. */

@@ -55,7 +55,14 @@ class Planner {
                         .programs = {},
                         .locations = {},
                         .globals = {},
-                        .place = task.place};
+                        .place = task.place,
+                        .extension = task.extension};
+    if (task.single.empty() && !task.interval_ns && task.extension.external_event.empty()) {
+      return plan_.problems.push_back(
+          {task.place, fmt::format("TASK {} has neither INTERVAL nor SINGLE, and no task file gives it an "
+                                   "external_event, so it never runs",
+                                   task.name)});
+    }
     for (const iec::Program& program : resource_.programs) {
       if (folded(program.task) == folded(task.name)) planned.programs.push_back(&program);
     }
@@ -63,13 +70,25 @@ class Planner {
       return plan_.remarks.push_back(
           {task.place, fmt::format("TASK {} runs no program, so it is left out", task.name)});
     }
-    if (!task.single.empty() && task.interval_ns) {
+    if (!task.extension.external_event.empty()) {
+      run_by_event(planned);
+    } else if (!task.single.empty() && task.interval_ns) {
       plan_.remarks.push_back(
           {task.place, fmt::format("TASK {} has SINGLE and INTERVAL: only the edge of {} runs it", task.name,
                                    task.single)});
       planned.interval_ns = 0;
     }
     plan_.tasks.push_back(std::move(planned));
+  }
+  void run_by_event(PlannedTask& task) {
+    const std::string_view other = !task.single.empty() ? "SINGLE" : task.interval_ns != 0 ? "INTERVAL" : "";
+    if (!other.empty()) {
+      plan_.remarks.push_back({task.place, fmt::format("TASK {}: the external event {} runs it, so its {} "
+                                                       "is not used",
+                                                       task.name, task.extension.external_event, other)});
+    }
+    task.interval_ns = 0;
+    task.single.clear();
   }
   void add_freewheeling(const iec::Program& program) {
     plan_.tasks.push_back({.name = program.name,
@@ -79,10 +98,13 @@ class Planner {
                            .programs = {&program},
                            .locations = {},
                            .globals = {},
-                           .place = program.place});
-    plan_.remarks.push_back(
-        {program.place, fmt::format("PROGRAM {} has no TASK: it runs freewheeling, with priority {}",
-                                    program.name, kLowestPriority)});
+                           .place = program.place,
+                           .extension = program.extension});
+    const std::string& event = program.extension.external_event;
+    const std::string runs =
+        event.empty() ? "it runs freewheeling" : "the external event " + event + " runs it";
+    plan_.remarks.push_back({program.place, fmt::format("PROGRAM {} has no TASK: {}, with priority {}",
+                                                        program.name, runs, kLowestPriority)});
   }
   void refuse_connection(const iec::Program& program) {
     plan_.problems.push_back(
@@ -152,7 +174,8 @@ class Planner {
     const std::string& location = global->second->location;
     if (location.empty()) return;
     const bool is_read = std::ranges::any_of(plan_.tasks, [&](const PlannedTask& other) {
-      return other.single.empty() && other.locations.contains(location);
+      return other.single.empty() && other.extension.external_event.empty() &&
+             other.locations.contains(location);
     });
     if (is_read) return;
     plan_.problems.push_back(

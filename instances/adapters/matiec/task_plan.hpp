@@ -21,6 +21,7 @@ struct PlannedTask {
   std::set<std::string> locations;            ///< of the located variables that they use
   std::set<std::string> globals;              ///< that they use, folded
   iec::SourcePlace place;
+  iec::TaskExtension extension = {};
 };
 
 struct TaskPlan {
