@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/task_file.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
@@ -29,6 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxSource = std::size_t{16} << 20;
+constexpr std::size_t kMaxTaskFile = std::size_t{1} << 20;
 constexpr std::ptrdiff_t kShownLines = 20;  // of a C compiler's output
 
 std::string text_of(const fs::path& file) {
@@ -116,6 +118,7 @@ class Build {
           project_.configurations.size()));
     }
     if (report_.problems.empty()) check_file_names();
+    if (report_.problems.empty()) read_task_file();
     return report_.problems.empty();
   }
   // iec2c makes a file for each of these names, and for the POUs.
@@ -133,6 +136,25 @@ class Build {
     }
     if (configuration().resources.empty())
       fail({configuration().place, "this CONFIGURATION runs no program"});
+  }
+  void read_task_file() {
+    std::string file = order_.tasks;
+    if (file.empty() && sources_.size() == 1) {
+      std::error_code error;
+      const fs::path beside = fs::path(sources_.front().file).replace_extension(".toml");
+      if (!fs::is_regular_file(beside, error)) return;
+      file = beside;
+      report_.remarks.push_back(
+          {{file, 0, 0},
+           fmt::format("is read as the task file of {}, as it lies beside it", sources_.front().file)});
+    }
+    if (file.empty()) return;
+    std::error_code error;
+    const auto size = fs::file_size(file, error);
+    if (error) return fail({{file, 0, 0}, fmt::format("cannot be read: {}", error.message())});
+    if (size > kMaxTaskFile) return fail({{file, 0, 0}, "is larger than 1 MiB"});
+    std::ranges::move(iec::read_task_file({file, text_of(file)}, project_.configurations.front()),
+                      std::back_inserter(report_.problems));
   }
   void read_source(const std::string& file) {
     std::error_code error;

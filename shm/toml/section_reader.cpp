@@ -33,7 +33,10 @@ unsigned SectionReader::line_of(std::string_view key) const {
 
 void SectionReader::problem(std::string_view key, std::string_view text) {
   wrong_.emplace_back(key);
-  problems_.push_back({line_of(key), fmt::format("{} {}: {}", where_, key, text)});
+  const auto found = table_.find(key);
+  problems_.push_back({.line = line_of(key),
+                       .text = fmt::format("{} {}: {}", where_, key, text),
+                       .column = found == table_.end() ? 0 : column_of(found->second)});
 }
 
 bool SectionReader::wrong(std::string_view key) const {
@@ -140,8 +143,10 @@ void SectionReader::refuse_unknown_keys() {
     if (std::ranges::find(known_, std::string_view(key)) != known_.end()) continue;
     constexpr std::size_t kShown = 80;
     problems_.push_back(
-        {value.line, fmt::format("{} unknown key '{}'; allowed are {}{}", where_, key.substr(0, kShown),
-                                 join_names(known_), suggestion(key, known_))});
+        {.line = value.line,
+         .text = fmt::format("{} unknown key '{}'; allowed are {}{}", where_, key.substr(0, kShown),
+                             join_names(known_), suggestion(key, known_)),
+         .column = column_of(value)});
   }
 }
 

@@ -29,6 +29,8 @@ class SectionReader {
   void numbers(std::string_view key, std::int64_t least, std::int64_t most,
                std::optional<std::vector<int>>& target);
 
+  /// From here on problems have columns, too.
+  void tell_columns() { columns_ = true; }
   /// A key that is read by somebody else.
   void know(std::string_view key) { known_.push_back(key); }
   /// After all keys: reports those that nobody asked for.
@@ -47,10 +49,12 @@ class SectionReader {
  private:
   const TomlValue* find(std::string_view key);
   void wrong_type(std::string_view key, const TomlValue& value, std::string_view wanted);
+  [[nodiscard]] unsigned column_of(const TomlValue& value) const { return columns_ ? value.column : 0; }
 
   const TomlTable& table_;
   unsigned line_;
   std::string where_;
+  bool columns_ = false;
   std::vector<ConfigProblem>& problems_;
   std::vector<std::string_view> known_;
   std::vector<std::string> wrong_;

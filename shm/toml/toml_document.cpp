@@ -21,7 +21,10 @@ TomlTable convert_table(const toml::table& table) {
   for (const auto& [key, node] : table) {
     TomlValue value = convert(node);
     // A header like [host] may span lines; the key's own line is what an editor shows.
-    if (key.source().begin) value.line = key.source().begin.line;
+    if (const auto begin = key.source().begin) {
+      value.line = begin.line;
+      value.column = begin.column;
+    }
     converted.emplace(std::string(key.str()), std::move(value));
   }
   return converted;
@@ -30,6 +33,7 @@ TomlTable convert_table(const toml::table& table) {
 TomlValue convert(const toml::node& node) {
   TomlValue converted;
   converted.line = node.source().begin.line;
+  converted.column = node.source().begin.column;
   if (const auto* text = node.as_string()) {
     converted.value = text->get();
   } else if (const auto* number = node.as_integer()) {

@@ -14,11 +14,12 @@ struct TomlValue;
 using TomlArray = std::vector<TomlValue>;
 using TomlTable = std::map<std::string, TomlValue, std::less<>>;
 
-/// A value of a TOML file, with the line that it stands in. Keeps the parser out of everybody else's headers.
+/// A value of a TOML file, with the place of its key. Keeps the parser out of everybody else's headers.
 struct TomlValue {
   /// monostate: a date or time, which no key of ours has.
   std::variant<std::monostate, std::string, std::int64_t, double, bool, TomlArray, TomlTable> value;
   unsigned line = 0;
+  unsigned column = 0;
 
   /// "a text", "a whole number", ...: for messages.
   [[nodiscard]] std::string_view type_name() const noexcept;

@@ -8,8 +8,10 @@
 #include <string_view>
 
 #include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/task_file.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
+#include "shm/base/names.hpp"
 
 namespace {
 
@@ -56,12 +58,36 @@ constexpr std::array<std::string_view, 40> kWords{"CONFIGURATION ",
                                                   "FUNCTION_BLOCK ",
                                                   "END_FUNCTION_BLOCK "};
 
+constexpr std::array<std::string_view, 19> kTomlWords{"[task.t]\n",
+                                                      "[task.q]\n",
+                                                      "[resource.a.task.t]\n",
+                                                      "[resource.d.task.t]\n",
+                                                      "external_event=",
+                                                      "late_policy=",
+                                                      "start_offset=",
+                                                      "drives_outputs=",
+                                                      "watchdog_time=",
+                                                      "watchdog_sensitivity=",
+                                                      "watchdog_omitted_cycles=",
+                                                      "watchdog_policy=",
+                                                      "scheduler=",
+                                                      "true\n",
+                                                      "'asap'\n",
+                                                      "'task'\n",
+                                                      "'product'\n",
+                                                      "'5ms'\n",
+                                                      "1\n"};
+constexpr const char* kTwoResources =
+    "CONFIGURATION c RESOURCE a ON b TASK t (INTERVAL := T#10ms, PRIORITY := 1); PROGRAM p WITH t : Main; "
+    "PROGRAM q : Main; END_RESOURCE RESOURCE d ON b TASK t (SINGLE := x, PRIORITY := 1); PROGRAM p WITH t : "
+    "Main; END_RESOURCE END_CONFIGURATION";
+
 /// Bytes alone seldom make a word.
-std::string text_of(std::span<const std::uint8_t> bytes) {
+std::string text_of(std::span<const std::uint8_t> bytes, std::span<const std::string_view> words) {
   std::string text;
   for (const std::uint8_t byte : bytes) {
-    if (byte < kWords.size()) {
-      text += kWords[byte];
+    if (byte < words.size()) {
+      text += words[byte];
     } else {
       text += static_cast<char>(byte);
     }
@@ -77,9 +103,23 @@ void require_name(const std::string& name) {
   if (!std::ranges::all_of(name, belongs)) std::abort();
 }
 
-void require_places(const iec::SourceProblems& problems) {
+void require_places(const iec::SourceProblems& problems, const char* file = "a.st") {
   for (const iec::SourceProblem& problem : problems) {
-    if (problem.place.file != "a.st" || problem.place.line == 0 || problem.text.empty()) std::abort();
+    if (problem.place.file != file || problem.place.line == 0 || problem.text.empty()) std::abort();
+  }
+}
+
+// Names of events go into the C file, too.
+void read_task_file(const std::string& text) {
+  const std::array<iec::Source, 1> sources{{{"a.st", kTwoResources}}};
+  iec::Project project = iec::read_project(sources).project;
+  iec::Configuration& configuration = project.configurations.front();
+  require_places(iec::read_task_file({"a.toml", text}, configuration), "a.toml");
+  for (iec::Resource& resource : configuration.resources) {
+    for (const iec::Task& task : resource.tasks) {
+      if (!std::ranges::all_of(task.extension.external_event, is_name_character)) std::abort();
+    }
+    (void)matiec::write_glue(project, configuration, resource, {});
   }
 }
 
@@ -87,7 +127,8 @@ void require_places(const iec::SourceProblems& problems) {
 
 // Any text comes to an end; problems have a place in it; nothing but names goes into the C file.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string text = text_of({data, size});
+  const std::string text = text_of({data, size}, kWords);
+  read_task_file(text_of({data, size}, kTomlWords));
   const std::array<iec::Source, 1> sources{{{"a.st", text}}};
   const auto [project, problems] = iec::read_project(sources);
   require_places(problems);

@@ -52,6 +52,11 @@ void add_build_verb(const Command& plcctl, CliSession& session) {
                  "files, or folders whose *.st are meant; one CONFIGURATION in all of them")
       .file("-o,--application", order->output,
             "where the application goes; of several resources each has its name in it")
+      .option(
+          "--tasks", order->tasks,
+          "external events, watchdogs and other options of the tasks, as TOML (else X.toml beside a single "
+          "X.st)",
+          "")
       .option("--matiec", order->matiec, "folder of the compiler iec2c with its lib (else in PATH)",
               "PLCHOST_MATIEC")
       .option("--keep", order->keep, "leave the files between in this folder", "");

@@ -242,9 +242,6 @@ class ProjectReader {
     }
     expect(")", fmt::format("at the end of TASK {}", task.name));
     take(";");
-    if (!task.interval_ns && task.single.empty()) {
-      report(task.place, fmt::format("TASK {} has neither INTERVAL nor SINGLE, so it never runs", task.name));
-    }
     if (task.priority < 0)
       report(task.place, fmt::format("TASK {} has no PRIORITY; 0 to 31 is allowed", task.name));
     resource.tasks.push_back(std::move(task));

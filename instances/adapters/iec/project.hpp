@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "instances/adapters/iec/source_place.hpp"
+#include "instances/adapters/iec/task_extension.hpp"
 
 namespace plchost::iec {
 
@@ -45,6 +46,7 @@ struct Task {
   std::string single;                       ///< the variable whose rising edge releases it; empty: none
   int priority = 0;                         ///< 0 is the highest
   SourcePlace place;
+  TaskExtension extension = {};
 };
 
 /// An instance of a program.
@@ -55,6 +57,7 @@ struct Program {
   bool connected = false;  ///< variables stand in parentheses behind its type
   bool retain = false;     ///< all its variables are retained
   SourcePlace place;
+  TaskExtension extension = {};  ///< of its own task, if it runs without one
 };
 
 /// A type that is declared in TYPE ... END_TYPE.

@@ -34,7 +34,10 @@ static void fill(Task_Info* info, const struct plchost_task* task) {
   strncpy(info->stName, task->name, sizeof info->stName - 1);
   info->nPriority = task->priority;
   info->dwTaskEntryFunctionPointer = task->run;
-  if (task->edge != NULL) {
+  if (task->external_event != NULL) {
+    info->KindOfTask = External;
+    strncpy(info->stExternalEvent, task->external_event, sizeof info->stExternalEvent - 1);
+  } else if (task->edge != NULL) {
     info->KindOfTask = Event;
     info->dwEventFunctionPointer = task->edge;
   } else if (task->interval_ns == 0) {
@@ -44,6 +47,29 @@ static void fill(Task_Info* info, const struct plchost_task* task) {
     info->bMicroseconds = task->interval_ns % 1000000 != 0;
     info->dwInterval = (unsigned int)(task->interval_ns / (info->bMicroseconds ? 1000 : 1000000));
   }
+}
+
+/* The log says what the runtime refuses. */
+static int set_options(const struct plchost_task* task) {
+  const struct plchost_options* const given = task->options;
+  Task_Options options;
+  if (given == NULL) return 1;
+  memset(&options, 0, sizeof options);
+  options.dwSize = sizeof options;
+  options.nStartOffsetNs = given->start_offset_ns;
+  options.nLatePolicy = given->late_policy;
+  options.bDrivesOutputs = given->drives_outputs;
+  options.dwWatchdogTimeUs = given->watchdog_time_us;
+  options.dwWatchdogSensitivity = given->watchdog_sensitivity;
+  options.dwWatchdogOmittedCycles = given->watchdog_omitted_cycles;
+  options.nWatchdogPolicy = given->watchdog_policy;
+  return plc_set_task_options(task->name, &options) == ERR_OK;
+}
+
+/* Several tasks may wait for one event. */
+static int register_event(const struct plchost_task* task) {
+  return task->external_event == NULL ||
+         SchedRegisterExternalEvent(task->external_event, NULL) != RTS_INVALID_HANDLE;
 }
 
 int CDECL plc_app_init(void) {
@@ -60,6 +86,9 @@ int CDECL plc_app_init(void) {
   strncpy(setup.stApplicationName, plchost_application_name, sizeof setup.stApplicationName - 1);
   setup.ptaskinfo = infos;
   __sys__setup__tasks(&setup);
+  for (i = 0; i < plchost_task_count; ++i) {
+    if (!set_options(&plchost_tasks[i]) || !register_event(&plchost_tasks[i])) return 1;
+  }
   return 0;
 }
 

@@ -1,6 +1,7 @@
 #include "instances/adapters/matiec/glue.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <map>
 #include <numeric>
@@ -126,7 +127,7 @@ class Writer {
   static unsigned end_bit(const Place& place) {
     return place.bit < 0 ? (place.offset + place.bytes) * 8 : first_bit(place) + 1;
   }
-  // In the order of their begins. What begins before the end of all before it has bits with one of them.
+  // In the order of their begins. One that begins before the others have ended shares bits.
   void find_aliases() {
     std::vector<std::size_t> order(places_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -174,6 +175,7 @@ class Writer {
     }
     print("  plchost_end({});\n}}\n", number);
     if (!task.single.empty()) write_edge(task, number);
+    if (task.extension.options) write_options(*task.extension.options, number);
     use_counts_.push_back(uses);
   }
 
@@ -264,18 +266,28 @@ class Writer {
     for (const std::size_t variable : variables_.retained[task]) result.push_back(retained_number_[variable]);
     return result;
   }
+  void write_options(const TaskOptions& options, std::size_t number) {
+    using std::chrono::microseconds;
+    const TaskWatchdog& watchdog = options.watchdog;
+    print("static const struct plchost_options plchost_options_{} = {{{}L, {}, {}, {}u, {}u, {}u, {}}};\n",
+          number, options.start_offset.count(), std::to_underlying(options.late),
+          options.drives_outputs ? 1 : 0, watchdog.time / microseconds(1), watchdog.sensitivity,
+          watchdog.omitted_cycles, std::to_underlying(watchdog.policy));
+  }
 
   void write_tasks() {
     print("const unsigned int plchost_task_count = {};\nconst struct plchost_task plchost_tasks[] = {{\n",
           plan_.tasks.size());
     for (std::size_t i = 0; i < plan_.tasks.size(); ++i) {
       const PlannedTask& task = plan_.tasks[i];
+      const std::string& event = task.extension.external_event;
       print(
           "  {{\"{0}\", {1}, {2}L, {3}, plchost_run_{4}, {5}, plchost_uses_{4}, {6}, "
-          "plchost_retained_{4}}},\n",
+          "plchost_retained_{4}, {7}, {8}}},\n",
           task.name, task.priority, task.interval_ns,
           task.single.empty() ? "0" : fmt::format("plchost_edge_{}", i), i, use_counts_[i],
-          variables_.retained[i].size());
+          variables_.retained[i].size(), event.empty() ? "0" : fmt::format("\"{}\"", event),
+          task.extension.options ? fmt::format("&plchost_options_{}", i) : "0");
     }
     print("}};\n");
   }

@@ -9,10 +9,9 @@
 
 namespace plchost::matiec {
 
-/// All sources one behind the other, as iec2c takes one file, and where each began. What iec2c does not take,
-/// and what means nothing to it, is replaced without moving any other word: comments of the third edition,
-/// pragmas of other tools, the mark of UTF-8, locations in lower case, and intervals in units that it does
-/// not know (it needs only that there is one).
+/// All sources one behind the other, as iec2c takes one file, and where each began. Some things are replaced,
+/// and no other word moves: comments of the third edition, pragmas of other tools, the mark of UTF-8. So are
+/// locations in lower case, and intervals in units that iec2c does not know: it needs only that there is one.
 class JoinedSource {
  public:
   explicit JoinedSource(std::span<const iec::Source> sources);

@@ -1,12 +1,14 @@
 /*
- * Located variables and their areas. A variable has one value, which all tasks share as they share globals:
+ * Located variables and their areas. A variable has one value. All tasks share it as they share globals.
  *
- *   %I  a task takes it from its copy of the inputs at the begin of its cycle. A variable of a program has a
- *       value for each task.
- *   %Q  the value is what counts: a task puts its places out at the end of its cycle, and with them the other
- *       bits of their bytes. Places that share bits are taken at the begin, and put out if they changed.
- *   %M  lies in memory that others write, too. It is taken if it is not what was exchanged last, and put out
- * if the value is not. So neither a pre-empting task nor firmware undoes what the other one wrote.
+ * Inputs: a task takes them from its copy of the area at the begin of its cycle. A variable of a program has
+ * a value for each task.
+ *
+ * Outputs: the value is the truth. A task puts its places out at the end of its cycle, and with them the
+ * other bits of their bytes. Places that share bits are taken at the begin, and put out if they changed.
+ *
+ * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last. It is
+ * put out if the program's value does. So neither a task that interrupts this one nor firmware is undone.
  */
 #include <stdlib.h>
 #include <string.h>

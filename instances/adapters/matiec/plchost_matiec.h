@@ -25,6 +25,17 @@ struct plchost_use {
   unsigned long long before;
 };
 
+/* Options that IEC 61131-3 does not have; the ranges are those of Task_Options in plc_app.h. */
+struct plchost_options {
+  long start_offset_ns;
+  short late_policy; /* PLC_LATE_... */
+  unsigned char drives_outputs;
+  unsigned int watchdog_time_us;
+  unsigned int watchdog_sensitivity;
+  unsigned int watchdog_omitted_cycles;
+  short watchdog_policy; /* PLC_WATCHDOG_... */
+};
+
 struct plchost_task {
   const char* name;
   short priority;
@@ -34,7 +45,9 @@ struct plchost_task {
   unsigned int uses_count;
   struct plchost_use* uses;
   unsigned int retained_count;
-  const unsigned int* retained; /* numbers among the retained variables */
+  const unsigned int* retained;          /* numbers among the retained variables */
+  const char* external_event;            /* each post runs it; null: none does */
+  const struct plchost_options* options; /* null: the defaults */
 };
 
 /* A variable that is not located. */

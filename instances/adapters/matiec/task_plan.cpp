@@ -10,7 +10,6 @@
 #include <fmt/ranges.h>
 
 #include "instances/adapters/iec/tokens.hpp"
-#include "instances/plc_app.h"
 #include "shm/base/names.hpp"
 
 namespace plchost::matiec {
@@ -22,6 +21,7 @@ using iec::folded;
 constexpr int kLowestPriority = 31;
 constexpr int kLastRealTimePriority = 15;
 constexpr std::int64_t kMicrosecond = 1'000;
+constexpr std::ptrdiff_t kMostUsers = 14;  // PLC_MAX_AREA_USES
 constexpr std::int64_t kMillisecond = 1'000'000;
 
 // Task_Info has the interval in an unsigned int, in milliseconds if they are whole ones, else in
@@ -79,20 +79,39 @@ class Planner {
                         .programs = {},
                         .places = {},
                         .globals = {},
-                        .place = task.place};
+                        .place = task.place,
+                        .extension = task.extension};
+    if (task.single.empty() && !task.interval_ns && task.extension.external_event.empty()) {
+      return plan_.problems.push_back(
+          {task.place, fmt::format("TASK {} has neither INTERVAL nor SINGLE, and no task file gives it an "
+                                   "external_event, so it never runs",
+                                   task.name)});
+    }
     if (const auto found = programs_.find(folded(task.name)); found != programs_.end())
       planned.programs = found->second;
     if (planned.programs.empty()) {
       return plan_.remarks.push_back(
           {task.place, fmt::format("TASK {} runs no program, so it is left out", task.name)});
     }
-    if (!task.single.empty() && task.interval_ns) {
+    if (!task.extension.external_event.empty()) {
+      run_by_event(planned);
+    } else if (!task.single.empty() && task.interval_ns) {
       plan_.remarks.push_back(
           {task.place, fmt::format("TASK {} has SINGLE and INTERVAL: only the edge of {} runs it", task.name,
                                    task.single)});
       planned.interval_ns = 0;
     }
     plan_.tasks.push_back(std::move(planned));
+  }
+  void run_by_event(PlannedTask& task) {
+    const std::string_view other = !task.single.empty() ? "SINGLE" : task.interval_ns != 0 ? "INTERVAL" : "";
+    if (!other.empty()) {
+      plan_.remarks.push_back({task.place, fmt::format("TASK {}: the external event {} runs it, so its {} "
+                                                       "is not used",
+                                                       task.name, task.extension.external_event, other)});
+    }
+    task.interval_ns = 0;
+    task.single.clear();
   }
   void add_freewheeling(const iec::Program& program) {
     plan_.tasks.push_back({.name = program.name,
@@ -102,10 +121,13 @@ class Planner {
                            .programs = {&program},
                            .places = {},
                            .globals = {},
-                           .place = program.place});
-    plan_.remarks.push_back(
-        {program.place, fmt::format("PROGRAM {} has no TASK: it runs freewheeling, with priority {}",
-                                    program.name, kLowestPriority)});
+                           .place = program.place,
+                           .extension = program.extension});
+    const std::string& event = program.extension.external_event;
+    const std::string runs =
+        event.empty() ? "it runs freewheeling" : "the external event " + event + " runs it";
+    plan_.remarks.push_back({program.place, fmt::format("PROGRAM {} has no TASK: {}, with priority {}",
+                                                        program.name, runs, kLowestPriority)});
   }
   void refuse_connection(const iec::Program& program) {
     plan_.problems.push_back(
@@ -225,11 +247,11 @@ class Planner {
       const auto users = std::ranges::count_if(plan_.tasks, [&](const PlannedTask& task) {
         return std::ranges::any_of(task.places, [&](const Place& place) { return place.area == letter; });
       });
-      if (users <= PLC_MAX_AREA_USES) continue;
+      if (users <= kMostUsers) continue;
       plan_.problems.push_back(
           {resource_.place,
            fmt::format("{} tasks use {} (%{}), at most {} can: run several programs in one task", users, name,
-                       letter, PLC_MAX_AREA_USES)});
+                       letter, kMostUsers)});
     }
   }
   // In the C of iec2c tasks, instances of programs, POUs and types have their names as they are, in upper
@@ -265,7 +287,7 @@ class Planner {
     // The memory area is read where it lies.
     if (!place || place->area == 'M') return;
     const bool is_read = std::ranges::any_of(plan_.tasks, [&](const PlannedTask& other) {
-      return other.single.empty() && other.places.contains(*place);
+      return other.single.empty() && other.extension.external_event.empty() && other.places.contains(*place);
     });
     if (is_read) return;
     plan_.problems.push_back(

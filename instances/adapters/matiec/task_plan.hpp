@@ -22,6 +22,7 @@ struct PlannedTask {
   std::set<Place> places;                     ///< of the located variables that they use
   std::set<std::string> globals;              ///< that they use, folded
   iec::SourcePlace place;
+  iec::TaskExtension extension = {};
 };
 
 struct TaskPlan {

@@ -1,7 +1,7 @@
 /*
  * The variables of the program that are not located. All of them go on in an online change. Those with RETAIN
- * are in an area of that kind, too: they are read from it before the first task starts, and each task puts
- * those that it may have changed there at the end of its cycles.
+ * have a copy in an area of that kind. They are read from it before the first task starts. Each task puts
+ * there those that it may have changed, at the end of its cycles.
  */
 #include <stdlib.h>
 #include <string.h>

@@ -138,7 +138,7 @@ struct ImageIn {
 struct ImageOut {
   std::uint8_t bits = 0, unused = 0;
   std::int16_t twice = 0;
-  std::uint8_t edges = 0, copied = 0, loops = 0, preset = 0;
+  std::uint8_t edges = 0, copied = 0, loops = 0, preset = 0, posts = 0;
 };
 
 class StructuredText : public ::testing::Test {
@@ -222,6 +222,20 @@ TEST_F(StructuredText, ByTheAdapterHasItsTasksAndItsLocatedVariables) {
   expect_it_works();
 }
 
+TEST_F(StructuredText, ByTheAdapterHasExternalEventsAndTheOptionsOfItsTasks) {
+  start(application("located"));
+  PoolEvent product = sut->event("product");
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return outputs().posts == 2; })) << "plc_app_init has registered the event";
+  EXPECT_TRUE(eventually([&] { return sut->task("guarded")->counters.cycles == 2; }));
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return sut->task("guarded")->state == PageTaskState::exception; }))
+      << "its watchdog and its policy";
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return outputs().posts == 4; })) << "the other tasks run on";
+}
+
 TEST_F(StructuredText, ThatMatiecTranslatesRunsAsItIsWritten) {
   if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
   const ProgramEnd built = build(kTwice);
@@ -294,6 +308,38 @@ TEST_F(StructuredText, ThatIsChangedOnlineGoesOnWithItsValues) {
   const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
   EXPECT_EQ(refused.code, ErrorCode::refused);
   EXPECT_THAT(refused.text, HasSubstr("variables 'ONE.FRESH': qwLayout is"));
+}
+
+TEST_F(StructuredText, HasTheTasksOfAFileBesideIt) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  constexpr const char* kCounts = R"(
+PROGRAM Posted VAR posts AT %QB8 : USINT; END_VAR posts := posts + 1; END_PROGRAM
+PROGRAM Cyclic VAR twice AT %QW1 : INT; END_VAR twice := 7; END_PROGRAM
+CONFIGURATION cell RESOURCE press ON PLC
+  TASK done (PRIORITY := 2);
+  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+  PROGRAM one WITH done : Posted;
+  PROGRAM two WITH fast : Cyclic;
+END_RESOURCE END_CONFIGURATION
+)";
+  EXPECT_THAT(build(kCounts).output, HasSubstr("TASK done has neither INTERVAL nor SINGLE"));
+  const std::string file = sandbox.write("twice.toml",
+                                         "[task.Done]\nexternal_event = 'product'\nwatchdog_time = '1s'\n"
+                                         "[task.fast]\nstart_offset = '250us'\n");
+  const ProgramEnd built = build(kCounts);
+  ASSERT_TRUE(built.success()) << built.output;
+  EXPECT_THAT(built.output, HasSubstr("twice.toml: note: is read as the task file of "));
+  start(sandbox.folder() + "/twice.so");
+  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; }));
+  EXPECT_EQ(outputs().posts, 0);
+  PoolEvent product = sut->event("product");
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return outputs().posts == 1; }));
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return outputs().posts == 2; }));
+  (void)sandbox.write("twice.toml", "[task.done]\nexternal_event = 'product'\nlate_policy = 'asap'\n");
+  EXPECT_THAT(build(kCounts).output,
+              HasSubstr("twice.toml:3:1: task done late_policy: this task is not cyclic"));
 }
 
 TEST_F(StructuredText, ThatIsWrongIsToldInItsOwnWords) {

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "instances/adapters/iec/task_file.hpp"
+
 namespace plchost::matiec {
 namespace {
 
@@ -23,14 +25,15 @@ class MatiecGlue : public testing::Test {
     return result;
   }
   Glue write(const std::string& programs, const std::string& globals, const std::string& resource,
-             const std::vector<Located>& located = {}) {
+             const std::vector<Located>& located = {}, const std::string& task_file = "") {
     const std::vector<iec::Source> sources{
         {"a.st", programs},
         {"c.st", "CONFIGURATION cell\n" + globals + "\nRESOURCE press ON PLC\n" + resource +
                      "\nEND_RESOURCE END_CONFIGURATION"}};
     auto [project, problems] = iec::read_project(sources);
     EXPECT_THAT(texts(problems), IsEmpty());
-    const iec::Configuration& configuration = project.configurations.at(0);
+    iec::Configuration& configuration = project.configurations.at(0);
+    EXPECT_THAT(texts(iec::read_task_file({"c.toml", task_file}, configuration)), IsEmpty());
     return write_glue(project, configuration, configuration.resources.at(0), located);
   }
   static constexpr const char* kMain =
@@ -75,6 +78,54 @@ TEST_F(MatiecGlue, MakesAnEventTaskOfSingle) {
   EXPECT_THAT(texts(glue.problems), IsEmpty());
   EXPECT_THAT(glue.text, HasSubstr("plchost_edge_0(void) { return *__GET_GLOBAL_GO(); }"));
   EXPECT_THAT(glue.text, HasSubstr("{\"edge\", 0, 0L, plchost_edge_0,"));
+}
+
+TEST_F(MatiecGlue, CarriesTheTaskFileToTheApplication) {
+  const Glue glue = write(kMain, kGo, std::string(kFast) + "PROGRAM one WITH fast : Main;", {},
+                          "[task.fast]\nlate_policy='asap'\nstart_offset='250us'\ndrives_outputs=true\n"
+                          "watchdog_time='5ms'\nwatchdog_sensitivity=3\nwatchdog_omitted_cycles=10\n"
+                          "watchdog_policy='task'\n");
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(glue.text, HasSubstr("plchost_options_0 = {250000L, 1, 1, 5000u, 3u, 10u, 1};"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_retained_0, 0, &plchost_options_0},"));
+  const Glue without = write(kMain, kGo, std::string(kFast) + "PROGRAM one WITH fast : Main;");
+  EXPECT_THAT(without.text, HasSubstr("plchost_retained_0, 0, 0},"));
+}
+
+TEST_F(MatiecGlue, RunsATaskByAnExternalEventInPlaceOfWhatTheSourceSays) {
+  const std::string one = "PROGRAM one WITH t : Main;";
+  const std::string file = "task.t.external_event='product'";
+  for (const auto& [task, remark] :
+       {std::pair{"TASK t (INTERVAL := T#10ms, PRIORITY := 1);", "INTERVAL"},
+        std::pair{"TASK t (SINGLE := go, INTERVAL := T#10ms, PRIORITY := 1);", "SINGLE"}}) {
+    const Glue glue = write(kMain, kGo, task + one, {}, file);
+    EXPECT_THAT(texts(glue.problems), IsEmpty());
+    EXPECT_THAT(
+        glue.text,
+        HasSubstr(
+            "{\"t\", 1, 0L, 0, plchost_run_0, 0, plchost_uses_0, 0, plchost_retained_0, \"product\", 0},"));
+    EXPECT_THAT(texts(glue.remarks),
+                ElementsAre(std::string("c.st:4:1: TASK t: the external event product runs it, so its ") +
+                            remark + " is not used"));
+  }
+  const Glue bare = write(kMain, kGo, "TASK t (PRIORITY := 1);" + one + kIdle, {}, file);
+  EXPECT_THAT(texts(bare.problems), IsEmpty());
+  EXPECT_THAT(texts(bare.remarks), ElementsAre(HasSubstr("TASK idle runs no program")));
+  EXPECT_THAT(texts(write(kMain, kGo, "TASK t (PRIORITY := 1);" + one + kIdle).problems),
+              ElementsAre("c.st:4:1: TASK t has neither INTERVAL nor SINGLE, and no task file gives it an "
+                          "external_event, so it never runs"));
+  EXPECT_THAT(
+      texts(write(kMain, kGo, "PROGRAM t : Main;", {}, file).remarks),
+      ElementsAre("c.st:4:1: PROGRAM t has no TASK: the external event product runs it, with priority 31"));
+}
+
+TEST_F(MatiecGlue, SeesNoEdgeInATaskThatOnlyAnEventRuns) {
+  EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR",
+                          std::string(kFast) + "TASK edge (SINGLE := go, PRIORITY := 0);"
+                                               "PROGRAM one WITH edge : Main; PROGRAM two WITH fast : Main;",
+                          {{"BOOL", "__IX0_0", "%IX0.0"}}, "task.fast.external_event='product'")
+                        .problems),
+              ElementsAre(HasSubstr("so nobody would see its edge")));
 }
 
 TEST_F(MatiecGlue, SaysWhatWouldNeverRelease) {

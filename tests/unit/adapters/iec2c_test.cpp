@@ -57,8 +57,8 @@ TEST(BuildOfAnApplication, SaysHowToGetACompiler) {
 
 TEST(BuildOfAnApplication, SaysWhatIsWrongInTheSourcesBeforeItRunsACompiler) {
   const std::string file = own_path("source.st");
-  std::ofstream(file)
-      << "CONFIGURATION c RESOURCE r ON PLC TASK t (PRIORITY := 1); END_RESOURCE END_CONFIGURATION";
+  std::ofstream(file) << "CONFIGURATION c RESOURCE r ON PLC TASK t (PRIORITY := 1); "
+                         "TASK u (INTERVAL := T#1s, PRIORITY := 1); END_RESOURCE END_CONFIGURATION";
   const BuildReport report = build_application({.sources = {file},
                                                 .output = file + ".so",
                                                 .matiec = "/nowhere",

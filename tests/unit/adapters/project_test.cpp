@@ -104,8 +104,6 @@ TEST(IecProject, MayHaveItsTasksInTheConfigurationItself) {
 }
 
 TEST(IecProject, SaysWhatIsWrongWithATask) {
-  EXPECT_THAT(problems_of(in_resource("TASK t (PRIORITY := 1);")),
-              ElementsAre("a.st:2:1: TASK t has neither INTERVAL nor SINGLE, so it never runs"));
   EXPECT_THAT(problems_of(in_resource("TASK t (INTERVAL := T#1s);")),
               ElementsAre("a.st:2:1: TASK t has no PRIORITY; 0 to 31 is allowed"));
   EXPECT_THAT(problems_of(in_resource("TASK t (INTERVAL := 20, PRIORITY := 1);")).at(0),

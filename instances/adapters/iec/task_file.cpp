@@ -1,0 +1,268 @@
+#include "instances/adapters/iec/task_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/duration.hpp"
+#include "instances/adapters/iec/tokens.hpp"
+#include "shm/base/names.hpp"
+#include "shm/toml/section_reader.hpp"
+#include "shm/toml/toml_document.hpp"
+
+namespace plchost::iec {
+
+namespace {
+
+using namespace std::string_view_literals;
+
+// In the order of their enumerators.
+constexpr std::array kLatePolicies = {"next"sv, "asap"sv};
+constexpr std::array kWatchdogPolicies = {"application"sv, "task"sv};
+static_assert(std::to_underlying(LatePolicy::asap) == 1);
+static_assert(std::to_underlying(WatchdogPolicy::task) == 1);
+
+constexpr std::string_view kSchedulerIsElsewhere =
+    "the scheduler belongs to the instance, not to the application; set it in [[instance]] of the host's "
+    "configuration, or by plcctl set scheduler";
+
+constexpr std::size_t kMostProblems = 100;  // more are not told
+
+/// A task of the configuration that a table may name.
+struct KnownTask {
+  const Resource* resource;
+  const std::string* name;
+  TaskExtension* extension;
+  std::int64_t interval_ns;  ///< of a cyclic one; 0: it is another one
+};
+
+class TaskFileReader {
+ public:
+  TaskFileReader(const Source& file, Configuration& configuration) : file_(file) {
+    for (Resource& resource : configuration.resources) {
+      resources_.push_back(&resource);
+      for (Task& task : resource.tasks) {
+        tasks_.push_back(
+            {&resource, &task.name, &task.extension, task.single.empty() ? task.interval_ns.value_or(0) : 0});
+      }
+      for (Program& program : resource.programs) {
+        if (program.task.empty()) tasks_.push_back({&resource, &program.name, &program.extension, 0});
+      }
+    }
+  }
+
+  SourceProblems read() {
+    if (const auto root = parse_toml(file_.text); !root) {
+      problems_.push_back(root.error());
+    } else {
+      read_root(*root);
+    }
+    std::ranges::sort(problems_, [](const ConfigProblem& a, const ConfigProblem& b) {
+      return std::tie(a.line, a.column, a.text) < std::tie(b.line, b.column, b.text);
+    });
+    SourceProblems result;
+    for (ConfigProblem& problem : problems_) {
+      result.push_back({{file_.file, problem.line, problem.column}, printable(std::move(problem.text))});
+    }
+    return result;
+  }
+
+ private:
+  void problem(const TomlValue& value, std::string text) {
+    problems_.push_back({.line = value.line, .text = std::move(text), .column = value.column});
+  }
+  const TomlTable* table(const TomlValue& value, std::string_view form) {
+    const auto* const found = std::get_if<TomlTable>(&value.value);
+    if (found == nullptr) problem(value, fmt::format("{} is no table; write [{}]", value.shown(), form));
+    return found;
+  }
+
+  void read_root(const TomlTable& root) {
+    for (const auto& [key, value] : root) {
+      if (key == "task") {
+        read_tasks(value, nullptr);
+      } else if (key == "resource") {
+        read_resources(value);
+      } else {
+        refuse(key, value, "[task.NAME] and [resource.NAME.task.NAME]");
+      }
+    }
+  }
+  void refuse(const std::string& key, const TomlValue& value, std::string_view allowed) {
+    problem(value, key == "scheduler"
+                       ? fmt::format("{}: {}", key, kSchedulerIsElsewhere)
+                       : fmt::format("'{}' is not expected here; allowed are {}", shown(key), allowed));
+  }
+
+  void read_resources(const TomlValue& value) {
+    const TomlTable* const resources = table(value, "resource.NAME.task.NAME");
+    if (resources == nullptr) return;
+    for (const auto& [name, one] : *resources) {
+      const Resource* const resource = find_resource(name, one);
+      const TomlTable* const members = table(one, "resource.NAME.task.NAME");
+      if (resource == nullptr || members == nullptr) continue;
+      for (const auto& [key, tasks] : *members) {
+        if (key == "task") {
+          read_tasks(tasks, resource);
+        } else {
+          refuse(key, tasks, "[resource.NAME.task.NAME]");
+        }
+      }
+    }
+  }
+  const Resource* find_resource(const std::string& name, const TomlValue& value) {
+    std::vector<std::string_view> names;
+    for (const Resource* const resource : resources_) {
+      if (!resource->name.empty() && folded(resource->name) == folded(name)) return resource;
+      if (!resource->name.empty()) names.push_back(resource->name);
+    }
+    problem(value, fmt::format("there is no RESOURCE '{}'; there are {}{}", shown(name), join_names(names),
+                               suggestion(name, names)));
+    return nullptr;
+  }
+
+  void read_tasks(const TomlValue& value, const Resource* resource) {
+    const TomlTable* const tasks = table(value, "task.NAME");
+    if (tasks == nullptr) return;
+    for (const auto& [name, one] : *tasks) {
+      if (problems_.size() >= kMostProblems) return;
+      const KnownTask* const task = find_task(name, one, resource);
+      const TomlTable* const keys = table(one, "task.NAME");
+      if (task == nullptr || keys == nullptr) continue;
+      if (task->extension->place.line != 0) {
+        problem(one, fmt::format("the task {} is given in line {}, too; remove one of both", *task->name,
+                                 task->extension->place.line));
+        continue;
+      }
+      task->extension->place = {file_.file, one.line, one.column};
+      read_task(*task, *keys, one.line);
+    }
+  }
+  const KnownTask* find_task(const std::string& name, const TomlValue& value, const Resource* resource) {
+    const KnownTask* found = nullptr;
+    std::vector<std::string_view> names;
+    for (const KnownTask& task : tasks_) {
+      if (resource != nullptr && task.resource != resource) continue;
+      names.push_back(*task.name);
+      if (folded(*task.name) != folded(name)) continue;
+      if (found != nullptr && found->resource != task.resource) {
+        problem(value, fmt::format("the resources {} and {} have a task {}; write [resource.{}.task.{}]",
+                                   found->resource->name, task.resource->name, *task.name,
+                                   found->resource->name, *task.name));
+        return nullptr;
+      }
+      found = &task;
+    }
+    if (found == nullptr) {
+      problem(value, fmt::format("there is no task '{}'; there are {}{}", shown(name), join_names(names),
+                                 suggestion(name, names)));
+    }
+    return found;
+  }
+
+  void read_task(const KnownTask& task, TomlTable keys, unsigned line) {
+    if (const auto scheduler = keys.extract("scheduler"); !scheduler.empty()) {
+      problem(scheduler.mapped(), fmt::format("task {} scheduler: {}", *task.name, kSchedulerIsElsewhere));
+    }
+    SectionReader reader(keys, line, fmt::format("task {}", *task.name), problems_);
+    reader.tell_columns();
+    read_event(reader, task.extension->external_event);
+    TaskOptions options;
+    options.late = static_cast<LatePolicy>(read_choice(reader, "late_policy", kLatePolicies));
+    read_duration(reader, keys, "start_offset", kMaxInterval, Duration(1), options.start_offset);
+    reader.truth("drives_outputs", options.drives_outputs);
+    TaskWatchdog& watchdog = options.watchdog;
+    read_duration(reader, keys, "watchdog_time", kMaxWatchdogTime, std::chrono::microseconds(1),
+                  watchdog.time);
+    read_count(reader, "watchdog_sensitivity", 1, watchdog.sensitivity);
+    read_count(reader, "watchdog_omitted_cycles", 0, watchdog.omitted_cycles);
+    watchdog.policy = static_cast<WatchdogPolicy>(read_choice(reader, "watchdog_policy", kWatchdogPolicies));
+    check_grid(reader, task, options);
+    if (keys.size() > (reader.has("external_event") ? 1U : 0U)) task.extension->options = options;
+    reader.refuse_unknown_keys();
+  }
+
+  static void read_event(SectionReader& reader, std::string& event) {
+    std::string name;
+    reader.text("external_event", name);
+    if (!reader.has_text("external_event") || reader.wrong("external_event")) return;
+    if (const auto good = check_name("the name of an event", name, kMaxEventName); !good) {
+      return reader.problem("external_event", good.error().message);
+    }
+    event = name;
+  }
+  static std::size_t read_choice(SectionReader& reader, std::string_view key,
+                                 std::span<const std::string_view> words) {
+    std::string word(words.front());
+    reader.choice(key, words, word);
+    return static_cast<std::size_t>(std::ranges::find(words, word) - words.begin());
+  }
+  static void read_count(SectionReader& reader, std::string_view key, std::int64_t least,
+                         std::uint32_t& target) {
+    std::int64_t count = target;
+    reader.number(key, least, kMaxWatchdogCount, count);
+    target = static_cast<std::uint32_t>(count);
+  }
+  static void read_duration(SectionReader& reader, const TomlTable& keys, std::string_view key, Duration most,
+                            Duration step, Duration& target) {
+    reader.know(key);
+    const auto found = keys.find(key);
+    if (found == keys.end()) return;
+    const auto* const written = std::get_if<std::string>(&found->second.value);
+    if (written == nullptr) {
+      return reader.problem(key, fmt::format("{} is {}; allowed is a duration in quotes, like \"5ms\"",
+                                             found->second.shown(), found->second.type_name()));
+    }
+    const std::string& text = *written;
+    const auto ns = nanoseconds_of("T#" + text);
+    if (!ns) {
+      return reader.problem(key, fmt::format("\"{}\" is no duration; allowed is \"1ms500us\", with the units "
+                                             "d, h, m, s, ms, us, ns",
+                                             shown(text)));
+    }
+    if (*ns < 0 || *ns > most.count() || *ns % step.count() != 0) {
+      return reader.problem(key, fmt::format("\"{}\" is out of range; allowed is 0s to {}{}", shown(text),
+                                             step > Duration(1) ? std::to_string(most / step) + "us" : "50d",
+                                             step > Duration(1) ? " in whole microseconds" : ""));
+    }
+    target = Duration(*ns);
+  }
+  // Only what is planned can be moved against others, or late.
+  static void check_grid(SectionReader& reader, const KnownTask& task, const TaskOptions& options) {
+    const bool is_cyclic = task.interval_ns != 0 && !reader.has("external_event");
+    for (const std::string_view key : {"late_policy"sv, "start_offset"sv}) {
+      if (reader.has(key) && !is_cyclic) {
+        reader.problem(key,
+                       "this task is not cyclic; allowed is this key only with an INTERVAL that runs it");
+      }
+    }
+    if (is_cyclic && options.start_offset.count() >= task.interval_ns) {
+      reader.problem("start_offset",
+                     fmt::format("is not below the task's INTERVAL of {} ns", task.interval_ns));
+    }
+  }
+
+  const Source& file_;
+  std::vector<const Resource*> resources_;
+  std::vector<KnownTask> tasks_;
+  std::vector<ConfigProblem> problems_;
+};
+
+}  // namespace
+
+SourceProblems read_task_file(const Source& file, Configuration& configuration) {
+  return TaskFileReader(file, configuration).read();
+}
+
+}  // namespace plchost::iec
