@@ -4,8 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <iterator>
+#include <optional>
+#include <ranges>
 #include <span>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "instances/adapters/iec/tokens.hpp"
 
@@ -63,14 +67,73 @@ class IntervalFinder {
   int behind_ = 0;  // 1: INTERVAL, 2: INTERVAL :=
 };
 
+// iec2c wants located variables of a program in sections of their own.
+class SectionSplitter {
+ public:
+  /// Each token, in the order of the source.
+  void look(const Token& token) {
+    if (token.is("PROGRAM")) in_program_ = true;
+    if (token.is("END_PROGRAM") || token.is("CONFIGURATION")) in_program_ = false;
+    if (token.is("VAR") && in_program_) {
+      begin_section();
+    } else if (in_section_) {
+      look_in_section(token);
+    }
+  }
+  void apply(std::string& text) const {
+    for (const auto& [offset, words] : std::views::reverse(insertions_)) text.insert(offset, words);
+  }
+
+ private:
+  using Insertions = std::vector<std::pair<std::size_t, std::string>>;
+
+  void begin_section() {
+    in_section_ = true;
+    qualifiers_.clear();
+    words_ = 0;
+    is_located_ = false;
+    end_.reset();
+  }
+  void look_in_section(const Token& token) {
+    const bool qualifies = token.is("RETAIN") || token.is("NON_RETAIN") || token.is("CONSTANT");
+    if (token.is("END_VAR")) {
+      in_section_ = false;
+    } else if (words_ == 0 && !end_ && qualifies) {
+      qualifiers_ += " " + token.text;
+    } else if (token.is(";")) {
+      end_declaration(token.offset + 1);
+    } else {
+      is_located_ = is_located_ || (words_ == 1 && token.is("AT"));
+      ++words_;
+    }
+  }
+  void end_declaration(std::size_t end) {
+    if (end_ && is_located_ != was_located_) insertions_.emplace_back(*end_, " END_VAR VAR" + qualifiers_);
+    was_located_ = std::exchange(is_located_, false);
+    words_ = 0;
+    end_ = end;
+  }
+
+  Insertions insertions_;
+  bool in_program_ = false;
+  bool in_section_ = false;
+  std::string qualifiers_;
+  int words_ = 0;  // of this declaration
+  bool is_located_ = false;
+  bool was_located_ = false;        // the one before
+  std::optional<std::size_t> end_;  // of the one before
+};
+
 std::string for_iec2c(const iec::Source& source) {
   constexpr std::string_view kAnyInterval = "T#1ms";
   std::string text = source.text;
   const iec::Tokens tokens = iec::tokens_of(text, source.file);
   for (const iec::Stretch& comment : tokens.new_comments) blank(text, comment.offset, comment.bytes);
   IntervalFinder intervals;
+  SectionSplitter sections;
   for (const Token& token : tokens.all) {
     const bool is_interval = intervals.is_interval(token);
+    sections.look(token);
     if (is_of_other_tools(token)) {
       blank(text, token.offset, token.text.size());
     } else if (token.kind == Token::Kind::place) {
@@ -80,6 +143,7 @@ std::string for_iec2c(const iec::Source& source) {
       text.replace(token.offset, kAnyInterval.size(), kAnyInterval);
     }
   }
+  sections.apply(text);
   return text.substr(iec::byte_order_mark(text));
 }
 

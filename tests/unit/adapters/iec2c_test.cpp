@@ -49,6 +49,24 @@ TEST(Iec2cErrors, InItsLibraryNameTheNameOfTheProgramThatItHasToo) {
   std::remove(library.c_str());
 }
 
+TEST(TheJoinedSource, HasLocatedVariablesInSectionsOfTheirOwn) {
+  const auto joined = [](const std::string& text) {
+    return JoinedSource(std::vector<iec::Source>{{"a.st", text}}).text();
+  };
+  EXPECT_EQ(
+      joined(
+          "PROGRAM P VAR a AT %QX0.0 : BOOL;\n t : TON;\n u : INT;\n b AT %qw1 : INT; END_VAR END_PROGRAM\n"),
+      "PROGRAM P VAR a AT %QX0.0 : BOOL; END_VAR VAR\n t : TON;\n u : INT; END_VAR VAR\n b AT %QW1 : INT; "
+      "END_VAR END_PROGRAM\n");
+  EXPECT_EQ(joined("PROGRAM P VAR RETAIN a : INT; b AT %QB0 : BYTE; END_VAR END_PROGRAM\n"),
+            "PROGRAM P VAR RETAIN a : INT; END_VAR VAR RETAIN b AT %QB0 : BYTE; END_VAR END_PROGRAM\n");
+  for (const char* same :
+       {"PROGRAM P VAR a : INT; b : INT; END_VAR VAR c AT %QB0 : BYTE; END_VAR END_PROGRAM\n",
+        "CONFIGURATION c VAR_GLOBAL a : INT; b AT %QB0 : BYTE; END_VAR END_CONFIGURATION\n"}) {
+    EXPECT_EQ(joined(same), same);
+  }
+}
+
 TEST(BuildOfAnApplication, SaysHowToGetACompiler) {
   const auto none = find_compiler("/nowhere");
   ASSERT_FALSE(none);
