@@ -1,19 +1,21 @@
 #include "instances/adapters/build_application.hpp"
 
 #include <algorithm>
-#include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
+#include <optional>
 #include <ranges>
 #include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
+#include "instances/adapters/c_compiler.hpp"
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/task_file.hpp"
 #include "instances/adapters/iec/tokens.hpp"
@@ -21,7 +23,10 @@
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/located.hpp"
 #include "instances/adapters/matiec/task_plan.hpp"
+#include "instances/adapters/output_file.hpp"
 #include "instances/adapters/run_program.hpp"
+#include "instances/adapters/text_files.hpp"
+#include "instances/adapters/work_folder.hpp"
 
 namespace plchost {
 
@@ -31,12 +36,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxSource = std::size_t{16} << 20;
 constexpr std::size_t kMaxTaskFile = std::size_t{1} << 20;
+constexpr const char* kConfigurationFile = "plchost_configuration.c";
 constexpr std::ptrdiff_t kShownLines = 20;  // of a C compiler's output
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 std::string first_lines(const std::string& text) {
   std::istringstream stream(text);
@@ -46,52 +47,35 @@ std::string first_lines(const std::string& text) {
   return result;
 }
 
-/// A folder that goes with its owner, unless it is to be kept.
-class WorkFolder {
- public:
-  explicit WorkFolder(std::string kept) : path_(std::move(kept)), kept_(!path_.empty()) {
-    std::error_code error;
-    if (kept_) {
-      fs::create_directories(path_, error);
-    } else {
-      std::string pattern = (fs::temp_directory_path(error) / "plchost-build.XXXXXX").string();
-      if (::mkdtemp(pattern.data()) != nullptr) path_ = pattern;
-    }
-    std::error_code ignored;
-    if (!path_.empty()) path_ = fs::absolute(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  ~WorkFolder() {
-    std::error_code error;
-    if (!kept_ && !path_.empty()) fs::remove_all(path_, error);
-  }
-  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
-  [[nodiscard]] bool is_there() const {
-    std::error_code error;
-    return fs::is_directory(path_, error);
-  }
-
- private:
-  fs::path path_;
-  bool kept_;
-};
+/// Whether a file lies in that folder, wherever links lead.
+bool lies_in(const fs::path& file, const fs::path& folder) {
+  std::error_code error;
+  const fs::path inside = fs::weakly_canonical(fs::absolute(folder, error), error);
+  const fs::path there = fs::weakly_canonical(fs::absolute(file, error), error);
+  return !error && std::ranges::mismatch(inside, there).in1 == inside.end();
+}
 
 class Build {
  public:
-  explicit Build(const BuildOrder& order) : order_(order), work_(order.keep) {}
+  explicit Build(const BuildOrder& order) : order_(order) {}
 
   BuildReport run() {
-    if (read_sources() && can_be_planned() && translate()) {
+    if (read_sources() && can_be_planned() && outputs_are_free() && translate()) {
       for (const iec::Resource& resource : configuration().resources) make(resource);
+      if (report_.problems.empty()) publish();
     }
-    if (!report_.problems.empty()) remove_made();
     return std::move(report_);
   }
 
  private:
   void fail(iec::SourceProblem problem) { report_.problems.push_back(std::move(problem)); }
   void fail(std::string text) { fail({{}, std::move(text)}); }
+  // Whether it has succeeded: an error is among the problems.
+  template <class T>
+  bool has(const Result<T>& result) {
+    if (!result) fail(result.error().describe());
+    return result.has_value();
+  }
   [[nodiscard]] const iec::Configuration& configuration() const { return project_.configurations.front(); }
 
   bool read_sources() {
@@ -102,13 +86,18 @@ class Build {
         continue;
       }
       std::vector<std::string> files;
-      for (const auto& entry : fs::directory_iterator(name, error)) {
-        if (iec::folded(entry.path().extension().string()) == ".ST") files.push_back(entry.path());
+      for (fs::directory_iterator it(name, error), end; !error && it != end; it.increment(error)) {
+        if (iec::folded(it->path().extension().string()) == ".ST") files.push_back(it->path());
+      }
+      if (error) {
+        fail({{name, 0, 0}, fmt::format("this folder cannot be read: {}", error.message())});
+        continue;
       }
       if (files.empty()) fail({{name, 0, 0}, "this folder has no file *.st"});
       std::ranges::sort(files);
       for (const std::string& file : files) read_source(file);
     }
+    if (!report_.problems.empty()) return false;
     auto [project, problems] = iec::read_project(sources_);
     project_ = std::move(project);
     std::ranges::move(problems, std::back_inserter(report_.problems));
@@ -121,19 +110,21 @@ class Build {
     if (report_.problems.empty()) read_task_file();
     return report_.problems.empty();
   }
-  // iec2c makes a file for each of these names, and for the POUs.
+  // iec2c makes a file of each of these names. The files of the library are found by name, too.
   void check_file_names() {
-    std::vector<std::string> names{"POUS", iec::folded(configuration().name)};
-    for (const iec::Resource& resource : configuration().resources) {
-      const std::string name = iec::folded(resource.name);
-      if (std::ranges::find(names, name) != names.end()) {
-        fail({resource.place,
-              fmt::format("RESOURCE {}: this name is taken by the CONFIGURATION, by another RESOURCE or by "
-                          "a file of iec2c (POUS)",
-                          resource.name)});
+    std::vector<std::string> names{"POUS", "LOCATED_VARIABLES", "IEC_STD_LIB", "ACCESSOR"};
+    const auto check = [&](const char* kind, const std::string& given, const iec::SourcePlace& place) {
+      const std::string name = iec::folded(given);
+      if (std::ranges::find(names, name) != names.end() || name.starts_with("PLCHOST_")) {
+        fail({place, fmt::format("{} {}: a file of the build or another RESOURCE has this name; choose "
+                                 "another one",
+                                 kind, given)});
       }
       names.push_back(name);
-    }
+    };
+    check("CONFIGURATION", configuration().name, configuration().place);
+    for (const iec::Resource& resource : configuration().resources)
+      check("RESOURCE", resource.name, resource.place);
     if (configuration().resources.empty())
       fail({configuration().place, "this CONFIGURATION runs no program"});
   }
@@ -149,19 +140,17 @@ class Build {
            fmt::format("is read as the task file of {}, as it lies beside it", sources_.front().file)});
     }
     if (file.empty()) return;
-    std::error_code error;
-    const auto size = fs::file_size(file, error);
-    if (error) return fail({{file, 0, 0}, fmt::format("cannot be read: {}", error.message())});
-    if (size > kMaxTaskFile) return fail({{file, 0, 0}, "is larger than 1 MiB"});
-    std::ranges::move(iec::read_task_file({file, text_of(file)}, project_.configurations.front()),
+    auto read = read_text_file(file, kMaxTaskFile);
+    if (!has(read)) return;
+    identities_.push_back(read->identity);
+    std::ranges::move(iec::read_task_file({file, std::move(read->text)}, project_.configurations.front()),
                       std::back_inserter(report_.problems));
   }
   void read_source(const std::string& file) {
-    std::error_code error;
-    const auto size = fs::file_size(file, error);
-    if (error) return fail({{file, 0, 0}, fmt::format("cannot be read: {}", error.message())});
-    if (size > kMaxSource) return fail({{file, 0, 0}, "is larger than 16 MiB"});
-    sources_.push_back({file, text_of(file)});
+    auto read = read_text_file(file, kMaxSource);
+    if (!has(read)) return;
+    sources_.push_back({file, std::move(read->text)});
+    identities_.push_back(read->identity);
   }
 
   // Before iec2c sees them: of some it says nothing, by others it is ended.
@@ -173,89 +162,111 @@ class Build {
     return report_.problems.empty();
   }
 
-  bool translate() {
-    const auto compiler = matiec::find_compiler(order_.matiec);
-    if (!compiler) {
-      fail(compiler.error().describe());
-      return false;
+  bool outputs_are_free() {
+    for (const iec::Resource& resource : configuration().resources) {
+      const std::string output = output_of(resource);
+      if (std::string why = why_no_output(output); !why.empty()) fail(std::move(why));
+      struct stat status{};
+      if (::stat(output.c_str(), &status) == 0 &&
+          std::ranges::find(identities_, FileIdentity{status.st_dev, status.st_ino}) != identities_.end()) {
+        fail(fmt::format("{} is one of the files that are read; name another one by -o", output));
+      }
+      if (!order_.keep.empty() && lies_in(output, order_.keep))
+        fail(fmt::format("{} lies in the folder of --keep, which a build empties; name another one", output));
     }
-    compiler_ = *compiler;
-    if (!work_.is_there()) {
-      fail(fmt::format("the folder {} for the files between cannot be made", work_.path().string()));
-      return false;
-    }
-    const matiec::JoinedSource joined(sources_);
-    std::ofstream(work_.path() / matiec::kJoinedFile) << joined.text();
-    const auto end =
-        run_program({fs::absolute(compiler_.program), "-f", "-p", "-l", "-I", fs::absolute(compiler_.library),
-                     "-T", ".", std::string(matiec::kJoinedFile)},
-                    work_.path());
-    if (!end) {
-      fail(end.error().describe());
-      return false;
-    }
-    std::ranges::move(matiec::problems_of(end->output, joined, project_, compiler_.library),
-                      std::back_inserter(report_.problems));
-    if (report_.problems.empty() && end->signal != 0) {
-      fail(fmt::format("iec2c was ended by {}, and has not said which line it could not translate",
-                       ::sigabbrev_np(end->signal)));
-    } else if (report_.problems.empty() && end->exit_code != 0) {
-      fail("iec2c has failed:" + first_lines(end->output));
+    for (const iec::Source& source : sources_) {
+      if (!order_.keep.empty() && lies_in(source.file, order_.keep))
+        fail({{source.file, 0, 0}, "lies in the folder of --keep, which a build empties; name another one"});
     }
     return report_.problems.empty();
   }
 
+  bool translate() {
+    auto compiler = matiec::find_compiler(order_.matiec);
+    auto words = c_compiler_words(std::getenv("CC"));  // NOLINT(concurrency-mt-unsafe): one thread here
+    if (!has(compiler) || !has(words)) return false;
+    compiler_ = *std::move(compiler);
+    c_compiler_ = *std::move(words);
+    auto folder = order_.keep.empty() ? WorkFolder::make_temporary() : WorkFolder::make_kept(order_.keep);
+    if (!has(folder)) return false;
+    work_.emplace(*std::move(folder));
+    const matiec::JoinedSource joined(sources_);
+    if (!has(work_->write(std::string(matiec::kJoinedFile), joined.text()))) return false;
+    const auto end = run("iec2c",
+                         {fs::absolute(compiler_.program), "-f", "-p", "-l", "-I",
+                          fs::absolute(compiler_.library), "-T", ".", std::string(matiec::kJoinedFile)},
+                         order_.translate_limit);
+    if (!end) return false;
+    std::ranges::move(matiec::problems_of(end->output, joined, project_, compiler_.library),
+                      std::back_inserter(report_.problems));
+    if (report_.problems.empty() && end->signal != 0) {
+      fail(fmt::format("iec2c was ended by SIG{}, and has not said which line it could not translate",
+                       ::sigabbrev_np(end->signal)));
+    } else if (report_.problems.empty() && end->exit_code != 0) {
+      fail("iec2c has failed:" + first_lines(end->output));
+    }
+    if (!report_.problems.empty() || !has(work_->check_room())) return false;
+    auto located = work_->read("LOCATED_VARIABLES.h");
+    if (!located) {
+      fail("iec2c has not done its work: " + located.error().describe());
+      return false;
+    }
+    located_ = matiec::located_variables(*located);
+    return has(work_->write(
+        kConfigurationFile,
+        fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
+  }
+
   void make(const iec::Resource& resource) {
-    matiec::Glue glue =
-        matiec::write_glue(project_, configuration(), resource,
-                           matiec::located_variables(text_of(work_.path() / "LOCATED_VARIABLES.h")));
+    matiec::Glue glue = matiec::write_glue(project_, configuration(), resource, located_);
     std::ranges::move(glue.problems, std::back_inserter(report_.problems));
     std::ranges::move(glue.remarks, std::back_inserter(report_.remarks));
     if (!report_.problems.empty()) return;
-    const std::string name = "application_" + (resource.name.empty() ? "RESOURCE" : resource.name);
-    std::ofstream(work_.path() / (name + ".c")) << glue.text;
-    const fs::path made = work_.path() / (name + ".so");
-    compile(name + ".c", made);
-    if (report_.problems.empty()) check(made);
-    if (report_.problems.empty()) put(made, output_of(resource));
+    const std::string name = "plchost_" + (resource.name.empty() ? "RESOURCE" : resource.name);
+    if (!has(work_->write(name + ".c", "#include \"plchost_library.h\"\n" + glue.text))) return;
+    const fs::path made = work_->path() / (name + ".so");
+    if (!compile(name + ".c", made) || !check(made)) return;
+    auto output = OutputFile::make(made, output_of(resource));
+    if (has(output)) outputs_.push_back(*std::move(output));
   }
 
-  // All symbols of the program are its own, so that two versions can be loaded at a time.
-  void compile(const std::string& glue, const fs::path& made) {
-    const char* const chosen =
-        std::getenv("CC");  // NOLINT(concurrency-mt-unsafe): plcctl has one thread here
+  bool compile(const std::string& glue, const fs::path& made) {
     const std::string adapters = fs::absolute(order_.adapters);
-    const auto end = run_program({chosen == nullptr ? "cc" : chosen,
-                                  "-std=gnu11",
-                                  "-O2",
-                                  "-g1",
-                                  "-w",
-                                  "-fPIC",
-                                  "-shared",
-                                  "-fvisibility=hidden",
-                                  "-D__CURRENT_TIME=(*plchost_now())",
-                                  "-I.",
-                                  "-I" + adapters,
-                                  "-I" + adapters + "/matiec",
-                                  "-I" + fs::absolute(compiler_.headers).string(),
-                                  "-o",
-                                  made,
-                                  glue,
-                                  configuration().name + ".c",
-                                  adapters + "/matiec/application.c",
-                                  adapters + "/matiec/places.c",
-                                  adapters + "/matiec/variables.c",
-                                  "-lm"},
-                                 work_.path());
-    if (!end) return fail(end.error().describe());
-    if (!end->success()) fail("the C compiler refuses what iec2c has written:" + first_lines(end->output));
+    std::vector<std::string> command = c_compiler_;
+    std::ranges::move(
+        c_compiler_arguments({.sources = {glue, kConfigurationFile, adapters + "/matiec/application.c",
+                                          adapters + "/matiec/places.c", adapters + "/matiec/variables.c"},
+                              .folders = {adapters, adapters + "/matiec", fs::absolute(compiler_.headers)},
+                              .output = made}),
+        std::back_inserter(command));
+    const auto end = run("the C compiler", command, order_.compile_limit);
+    if (end && !end->success())
+      fail("the C compiler refuses what iec2c has written:" + first_lines(end->output));
+    return end && end->success();
   }
 
-  void check(const fs::path& made) {
-    if (order_.check_program.empty()) return;
-    const auto end = run_program({order_.check_program, "--check-application", made}, work_.path());
-    if (!end) return fail(end.error().describe());
-    if (!end->success()) fail("plc-instance refuses the application:" + first_lines(end->output));
+  bool check(const fs::path& made) {
+    if (order_.check_program.empty()) return true;
+    const auto end = run("the check by plc-instance", {order_.check_program, "--check-application", made},
+                         order_.translate_limit);
+    if (end && !end->success()) fail("plc-instance refuses the application:" + first_lines(end->output));
+    return end && end->success();
+  }
+
+  /// None: it has not run to its end, and why is among the problems.
+  std::optional<ProgramEnd> run(const char* what, const std::vector<std::string>& command, Duration limit) {
+    auto end = run_program(command, work_->path(), {.time = limit, .cancelled = order_.cancelled});
+    if (!end) {
+      fail(fmt::format("{} cannot be started: {}", what, end.error().describe()));
+    } else if (end->cancelled) {
+      fail("interrupted: nothing was built");
+    } else if (end->over_limit) {
+      fail(fmt::format("{} has run for {} s and was ended; make the program smaller, or use a faster machine",
+                       what, std::chrono::duration_cast<std::chrono::seconds>(limit).count()));
+    } else {
+      return *std::move(end);
+    }
+    return std::nullopt;
   }
 
   [[nodiscard]] fs::path output_of(const iec::Resource& resource) const {
@@ -264,26 +275,26 @@ class Build {
     return output.replace_filename(output.stem().string() + "-" + resource.name +
                                    output.extension().string());
   }
-  // A reader of the old file sees it whole.
-  void put(const fs::path& made, const fs::path& output) {
-    std::error_code error;
-    const fs::path beside = output.string() + ".new";
-    fs::copy_file(made, beside, fs::copy_options::overwrite_existing, error);
-    if (!error) fs::rename(beside, output, error);
-    if (error) return fail(fmt::format("{} cannot be written: {}", output.string(), error.message()));
-    report_.applications.push_back(output);
-  }
-  void remove_made() {
-    std::error_code error;
-    for (const std::string& application : report_.applications) fs::remove(application, error);
-    report_.applications.clear();
+  // All, or none.
+  void publish() {
+    for (OutputFile& output : outputs_) {
+      if (!has(output.publish())) return;
+    }
+    for (OutputFile& output : outputs_) {
+      report_.applications.push_back(output.path());
+      output.keep();
+    }
   }
 
   const BuildOrder& order_;
-  WorkFolder work_;
+  std::optional<WorkFolder> work_;
   std::vector<iec::Source> sources_;
+  std::vector<FileIdentity> identities_;  // of all files that are read
   iec::Project project_;
   matiec::Compiler compiler_;
+  std::vector<std::string> c_compiler_;
+  std::vector<matiec::Located> located_;
+  std::vector<OutputFile> outputs_;
   BuildReport report_;
 };
 

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <chrono>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "instances/adapters/iec/source_place.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -14,13 +17,16 @@ struct BuildOrder {
   std::string output;         ///< the application: line.so. Of several resources each has its name in it
   std::string matiec;         ///< folder of the compiler; empty: PLCHOST_MATIEC, PATH
   std::string adapters;       ///< folder of plc_app.h and of the adapters' C files
-  std::string keep;           ///< folder in which the files between are left; empty: nowhere
+  std::string keep;           ///< folder in which the files between are left (see WorkFolder); empty: nowhere
   std::string check_program;  ///< plc-instance; empty: the application is not checked
+  Duration translate_limit = std::chrono::seconds(120);  ///< of iec2c, and of the check
+  Duration compile_limit = std::chrono::seconds(600);    ///< of the C compiler
+  std::function<bool()> cancelled = nullptr;  ///< asked every 50 ms: the build ends, nothing is left
 };
 
 struct BuildReport {
-  std::vector<std::string> applications;  ///< that were made
-  iec::SourceProblems problems;           ///< if there are any, no application was made
+  std::vector<std::string> applications;  ///< that were made: all, or none
+  iec::SourceProblems problems;           ///< if there are any, all files are as they were before
   iec::SourceProblems remarks;
 };
 

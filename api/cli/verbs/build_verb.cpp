@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/interrupt.hpp"
 #include "instances/adapters/build_application.hpp"
 #include "shm/base/names.hpp"
 
@@ -28,6 +29,8 @@ void tell(const std::string& text) {
 int build(const CliSession& session, BuildOrder order) {
   order.adapters = own_folder().parent_path() / "share" / "plchost" / "adapters";
   order.check_program = own_folder() / "plc-instance";
+  order.cancelled = interrupted;
+  catch_interrupts();
   const BuildReport report = build_application(order);
   for (const auto& problem : report.problems) tell(iec::describe(problem));
   if (!report.problems.empty()) return kExitFailed;
@@ -59,7 +62,8 @@ void add_build_verb(const Command& plcctl, CliSession& session) {
           "")
       .option("--matiec", order->matiec, "folder of the compiler iec2c with its lib (else in PATH)",
               "PLCHOST_MATIEC")
-      .option("--keep", order->keep, "leave the files between in this folder", "");
+      .option("--keep", order->keep,
+              "leave the files between in this folder: a new or empty one, or one of an earlier --keep", "");
 }
 
 }  // namespace plchost

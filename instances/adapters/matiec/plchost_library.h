@@ -1,0 +1,38 @@
+/*
+ * MATIEC's library for C, with two parts that suit a host. The C files of a program include it first; its own
+ * include of the library then does nothing.
+ */
+#ifndef PLCHOST_LIBRARY_H
+#define PLCHOST_LIBRARY_H
+
+#include <stdio.h>
+#include <stdlib.h>
+
+void plc_log(int nLevel, const char* pszText); /* of plc_app.h, whose other names the program may have */
+
+/* A date or a time of day is out of range. The library prints, and goes on with a wrong value, or reads
+ * beyond a table. Here the task gets an exception instead: nothing prints in a cycle. */
+_Noreturn static inline void plchost_runtime_error(void) {
+  plc_log(2, "IEC runtime error: a date or a time of day is out of range");
+  abort();
+}
+
+#define fprintf(...) plchost_runtime_error()
+#include "iec_std_lib.h"
+#undef fprintf
+
+/* The timers' clock begins when the machine does. RTC shows the date (UTC) while IN is FALSE. When IN rises,
+ * it goes on from PDT, by the timers' clock, so that a clock that is set does not disturb it. */
+static void plchost_rtc_body__(RTC* data__) {
+  struct timespec date;
+  IEC_TIMESPEC shown;
+  RTC_body__(data__);
+  if (__GET_VAR(data__->IN, ) || !__GET_VAR(data__->ENO, )) return;
+  clock_gettime(CLOCK_REALTIME, &date);
+  shown.tv_sec = date.tv_sec;
+  shown.tv_nsec = date.tv_nsec;
+  __SET_VAR(data__->, CDT, , shown);
+}
+#define RTC_body__ plchost_rtc_body__
+
+#endif
