@@ -11,7 +11,7 @@ namespace plchost {
 /// run for it. None, or only blanks: cc. A file of the first word is absolute, as it is run elsewhere.
 [[nodiscard]] Result<std::vector<std::string>> c_compiler_words(const char* cc);
 
-/// What to compile.
+/// The files to compile.
 struct CompileOrder {
   std::vector<std::string> sources;
   std::vector<std::string> folders;  ///< of headers

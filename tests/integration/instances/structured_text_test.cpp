@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -340,6 +341,34 @@ END_RESOURCE END_CONFIGURATION
   (void)sandbox.write("twice.toml", "[task.done]\nexternal_event = 'product'\nlate_policy = 'asap'\n");
   EXPECT_THAT(build(kCounts).output,
               HasSubstr("twice.toml:3:1: task done late_policy: this task is not cyclic"));
+}
+
+TEST_F(StructuredText, ThatIsNamedAsAHeaderOfCIsBuilt) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  std::string text = kCounting;
+  text.replace(text.find("CONFIGURATION cell"), 18, "CONFIGURATION math");
+  text.replace(text.find("RESOURCE press"), 14, "RESOURCE stdlib");
+  const ProgramEnd built = build(text, "named");
+  EXPECT_TRUE(built.success()) << built.output;
+}
+
+TEST_F(StructuredText, OfSeveralResourcesBecomesAllApplicationsOrNone) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  std::string text = kCounting;
+  const std::size_t resource = text.find("  RESOURCE press");
+  const std::string one = text.substr(resource, text.find("END_CONFIGURATION") - resource);
+  std::string other = one;
+  other.replace(other.find("press"), 5, "robot");
+  text.insert(resource, other);
+  ASSERT_TRUE(build(text, "two").success());
+  const std::string press = sandbox.folder() + "/two-press.so";
+  const std::string robot = sandbox.folder() + "/two-robot.so";
+  ASSERT_TRUE(std::filesystem::exists(press) && std::filesystem::exists(robot));
+  std::filesystem::remove(robot);
+  std::filesystem::remove(press);
+  std::filesystem::create_directory(robot);
+  EXPECT_FALSE(build(text, "two").success());
+  EXPECT_FALSE(std::filesystem::exists(press));
 }
 
 TEST_F(StructuredText, ThatIsWrongIsToldInItsOwnWords) {

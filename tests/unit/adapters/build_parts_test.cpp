@@ -1,0 +1,180 @@
+// The parts of a build that touch files and other programs.
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "instances/adapters/build_application.hpp"
+#include "instances/adapters/c_compiler.hpp"
+#include "instances/adapters/output_file.hpp"
+#include "instances/adapters/run_program.hpp"
+#include "instances/adapters/text_files.hpp"
+#include "instances/adapters/work_folder.hpp"
+#include "tests/support/own_name.hpp"
+
+namespace plchost {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class BuildParts : public testing::Test {
+ protected:
+  BuildParts() { fs::create_directories(folder_); }
+  ~BuildParts() override { fs::remove_all(folder_); }
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  std::string put(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name)) << text;
+    return path(name);
+  }
+  static std::string read(const std::string& file) {
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  [[nodiscard]] std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+
+ private:
+  std::string folder_ = own_path("parts");
+};
+
+TEST_F(BuildParts, TheCompilerIsCalledByWordsAsMakeDoes) {
+  EXPECT_THAT(c_compiler_words(nullptr).value(), ElementsAre("cc"));
+  EXPECT_THAT(c_compiler_words("").value(), ElementsAre("cc"));
+  EXPECT_THAT(c_compiler_words("ccache gcc -m64").value(), ElementsAre("ccache", "gcc", "-m64"));
+  EXPECT_THAT(c_compiler_words("gcc '-DNAME=a b'").value(), ElementsAre("gcc", "-DNAME=a b"));
+  for (const char* no_command : {"gcc; echo", "gcc $(echo x)", "gcc 'open"}) {
+    EXPECT_FALSE(c_compiler_words(no_command)) << no_command;
+  }
+}
+
+TEST_F(BuildParts, AnOutputThatIsNotKeptLeavesAllAsItWas) {
+  const std::string made = put("made", "new");
+  const std::string old = put("line.so", "old");
+  {
+    auto output = OutputFile::make(made, old);
+    ASSERT_TRUE(output) << output.error().describe();
+    EXPECT_EQ(read(old), "old") << "not published yet";
+    ASSERT_TRUE(output->publish());
+    EXPECT_EQ(read(old), "new");
+  }
+  EXPECT_EQ(read(old), "old");
+  {
+    auto output = OutputFile::make(made, path("other.so"));
+    ASSERT_TRUE(output && output->publish());
+  }
+  EXPECT_EQ(files(), 2U);
+}
+
+TEST_F(BuildParts, AnOutputThatIsKeptIsAloneInItsPlace) {
+  const std::string made = put("made", "new");
+  const std::string old = put("line.so", "old");
+  {
+    auto output = OutputFile::make(made, old);
+    ASSERT_TRUE(output && output->publish());
+    output->keep();
+  }
+  EXPECT_EQ(read(old), "new");
+  EXPECT_EQ(files(), 2U);
+}
+
+TEST_F(BuildParts, AnOutputIsAPlainFileInAFolderThatIsThere) {
+  EXPECT_THAT(why_no_output(path("none/line.so")), HasSubstr("there is no folder"));
+  EXPECT_THAT(why_no_output(path("")), HasSubstr("is a folder"));
+  EXPECT_THAT(why_no_output("/dev/null"), HasSubstr("is not a plain file"));
+  EXPECT_THAT(why_no_output(path("line.so")), IsEmpty());
+}
+
+TEST_F(BuildParts, AKeptFolderHasNothingOfTheUser) {
+  (void)put("mine.c", "x");
+  const auto refused = WorkFolder::make_kept(path(""));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().describe(), HasSubstr("mine.c is not of an earlier build"));
+  EXPECT_EQ(read(path("mine.c")), "x");
+
+  for (int build = 0; build < 2; ++build) {
+    auto kept = WorkFolder::make_kept(path("kept"));
+    ASSERT_TRUE(kept) << kept.error().describe();
+    EXPECT_TRUE(kept->write("joined.st", "text")) << "a file of the build before is gone";
+  }
+  EXPECT_EQ(read(path("kept/joined.st")), "text");
+  (void)put("kept/mine.c", "x");
+  EXPECT_FALSE(WorkFolder::make_kept(path("kept")));
+}
+
+TEST_F(BuildParts, ATemporaryFolderGoesWithTheBuild) {
+  std::string where;
+  {
+    auto folder = WorkFolder::make_temporary();
+    ASSERT_TRUE(folder) << folder.error().describe();
+    where = folder->path();
+    ASSERT_TRUE(folder->write("a", "b"));
+    EXPECT_TRUE(folder->check_room());
+    EXPECT_EQ(folder->read("a").value(), "b");
+    EXPECT_FALSE(folder->read("none"));
+  }
+  EXPECT_FALSE(fs::exists(where));
+}
+
+TEST_F(BuildParts, AFileIsNotWrittenOverOneThatIsThere) {
+  const std::string there = put("there", "old");
+  fs::create_symlink(there, path("link"));
+  EXPECT_EQ(write_new_file(path("link"), "new").error().code, ErrorCode::already_exists);
+  EXPECT_EQ(read(there), "old");
+  EXPECT_THAT(read_text_file(path("none"), 10).error().describe(), HasSubstr("none cannot be read"));
+  EXPECT_THAT(read_text_file(path(""), 10).error().describe(), HasSubstr("is not a plain file"));
+  EXPECT_EQ(read_text_file(there, 2).error().code, ErrorCode::wrong_size);
+}
+
+TEST_F(BuildParts, AProgramEndsWithItsChildrenAtItsLimitOrWhenItIsCancelled) {
+  const std::string pid = path("pid");
+  const std::vector<std::string> hangs{"sh", "-c", "sleep 1000 & echo $! >" + pid + "; echo said; wait"};
+  const auto child_is_gone = [&] {
+    const pid_t child = std::stoi(read(pid));
+    for (int i = 0; i < 2000 && ::kill(child, 0) == 0; ++i) ::usleep(10'000);
+    return ::kill(child, 0) != 0;
+  };
+  const auto late = run_program(hangs, path(""), {.time = milliseconds(500)});
+  ASSERT_TRUE(late);
+  EXPECT_TRUE(late->over_limit);
+  EXPECT_FALSE(late->success());
+  EXPECT_EQ(late->output, "said\n");
+  EXPECT_TRUE(child_is_gone());
+  const auto cancelled = run_program(hangs, path(""), {.cancelled = [&] { return !read(pid).empty(); }});
+  ASSERT_TRUE(cancelled);
+  EXPECT_TRUE(cancelled->cancelled);
+  EXPECT_TRUE(child_is_gone());
+}
+
+TEST_F(BuildParts, ABuildWritesOverNoneOfItsSources) {
+  const std::string source = put("line.st", R"(
+PROGRAM Main VAR a : INT; END_VAR a := 1; END_PROGRAM
+CONFIGURATION c RESOURCE r ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); PROGRAM p WITH t : Main; END_RESOURCE END_CONFIGURATION
+)");
+  ASSERT_EQ(::link(source.c_str(), path("other.so").c_str()), 0);
+  const auto said = [&](const std::string& output, const std::string& keep) {
+    const BuildReport report = build_application({.sources = {source},
+                                                  .output = output,
+                                                  .matiec = "/nowhere",
+                                                  .adapters = "",
+                                                  .keep = keep,
+                                                  .check_program = ""});
+    return report.problems.empty() ? "" : iec::describe(report.problems.front());
+  };
+  EXPECT_THAT(said(source, ""), HasSubstr("is one of the files that are read"));
+  EXPECT_THAT(said(path("other.so"), ""), HasSubstr("is one of the files that are read"));
+  EXPECT_THAT(said(path("line.so"), path("")), HasSubstr("lies in the folder of --keep"));
+  EXPECT_THAT(said(path("line.so"), ""), HasSubstr("there is no iec2c"));
+}
+
+}  // namespace
+}  // namespace plchost
