@@ -199,7 +199,8 @@ class Writer {
     std::string uses;
     std::size_t count = 0;
     const auto add = [&](std::size_t place, const std::string& value) {
-      uses += fmt::format("  {{{}, &{}, 0}},\n", place, value);
+      const bool is_of_others = !places_[place].tasks.contains(number);
+      uses += fmt::format("  {{{}, &{}, {}, 0}},\n", place, value, is_of_others ? 1 : 0);
       ++count;
     };
     const std::set<Place> own = own_inputs(task, number, add);

@@ -4,8 +4,9 @@
  * Inputs: a task takes them from its copy of the area at the begin of its cycle. A variable of a program has
  * a value for each task.
  *
- * Outputs: the value is the truth. A task puts its places out at the end of its cycle, and with them the
- * other bits of their bytes. Places that share bits are taken at the begin, and put out if they changed.
+ * Outputs: the value is the truth. A task puts its places out at the end of its cycle. With them it puts the
+ * other bits of their bytes, as the tasks that use those have put them last. Places that share bits are taken
+ * at the begin, and put out if they changed.
  *
  * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last. It is
  * put out if the program's value does. So neither a task that interrupts this one nor firmware is undone.
@@ -132,9 +133,35 @@ static void put_memory(unsigned int number, unsigned char* area) {
   __atomic_store_n(exchanged, value, __ATOMIC_SEQ_CST);
 }
 
+/* Of another version, whose values this one has: then they are those that were put last. */
+static void find_put(void) {
+  unsigned int i;
+  for (i = 0; i < plchost_place_count; ++i) {
+    const struct plchost_place* const place = &plchost_places[i];
+    if (place->area == 'Q') plchost_exchanged[i] = value_of(place, place->value);
+  }
+}
+
+static void put_output(const struct plchost_use* use, unsigned char* area) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  unsigned long long* const exchanged = &plchost_exchanged[use->place];
+  const unsigned long long value = value_of(place, use->value);
+  if (use->others) {
+    store(place, area, __atomic_load_n(exchanged, __ATOMIC_SEQ_CST));
+  } else if (!place->aliased || value != use->before) {
+    __atomic_store_n(exchanged, value, __ATOMIC_SEQ_CST);
+    store(place, area, value);
+  }
+}
+
 void plchost_take_places(const struct plchost_task* task) {
+  static int is_known = 0;
   unsigned char* found[AREAS];
   unsigned int i;
+  if (!__atomic_load_n(&is_known, __ATOMIC_SEQ_CST)) {
+    find_put();
+    __atomic_store_n(&is_known, 1, __ATOMIC_SEQ_CST);
+  }
   find_areas(found);
   for (i = 0; i < task->uses_count; ++i) {
     struct plchost_use* const use = &task->uses[i];
@@ -160,8 +187,7 @@ void plchost_put_places(const struct plchost_task* task) {
     if (place->area == 'M') {
       put_memory(use->place, area);
     } else if (place->area == 'Q') {
-      const unsigned long long value = value_of(place, use->value);
-      if (!place->aliased || value != use->before) store(place, area, value);
+      put_output(use, area);
     }
   }
 }

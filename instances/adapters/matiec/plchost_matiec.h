@@ -21,7 +21,8 @@ struct plchost_place {
 /* A place that a task exchanges with its area. */
 struct plchost_use {
   unsigned int place;
-  void* value; /* that of the place, or one of this task alone */
+  void* value;          /* that of the place, or one of this task alone */
+  unsigned char others; /* 1: only other tasks use it. It has bits in a byte that this one puts out */
   unsigned long long before;
 };
 
@@ -65,7 +66,7 @@ extern const unsigned int plchost_task_count;
 extern const struct plchost_task plchost_tasks[];
 extern const unsigned int plchost_place_count;
 extern const struct plchost_place plchost_places[];
-extern unsigned long long plchost_exchanged[]; /* for each place, in the memory area */
+extern unsigned long long plchost_exchanged[]; /* for each place, not in the inputs */
 void plchost_each_variable(void (*use)(const struct plchost_variable*));
 void plchost_bind(void); /* after config_init__() */
 void config_init__(void);

@@ -65,8 +65,9 @@ TEST_F(MatiecGlue, GivesATaskThePlacesThatItsProgramsUse) {
   EXPECT_THAT(texts(glue.problems), IsEmpty());
   EXPECT_THAT(
       glue.text,
-      HasSubstr("plchost_uses_0[] = {\n  {0, &plchost_value_0, 0},\n  {2, &plchost_value_2, 0},\n  {0}}"));
-  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1[] = {\n  {1, &plchost_value_1, 0},\n  {0}}"));
+      HasSubstr(
+          "plchost_uses_0[] = {\n  {0, &plchost_value_0, 0, 0},\n  {2, &plchost_value_2, 0, 0},\n  {0}}"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1[] = {\n  {1, &plchost_value_1, 0, 0},\n  {0}}"));
   EXPECT_THAT(glue.text, HasSubstr("{\"__IW2\", 'I', 2, -1, 0, 4u, &plchost_value_0}"));
   EXPECT_THAT(glue.text, HasSubstr("{\"__QX0_1\", 'Q', 1, 1, 0, 0u, &plchost_value_1}"));
 }
@@ -228,7 +229,8 @@ TEST_F(MatiecGlue, PutsOutTheOtherBitsOfItsBytesSinceAByteIsThatOfTheTaskThatCha
   EXPECT_THAT(texts(glue.problems), IsEmpty());
   EXPECT_THAT(
       glue.text,
-      HasSubstr("plchost_uses_0[] = {\n  {0, &plchost_value_0, 0},\n  {1, &plchost_value_1, 0},\n  {0}}"));
+      HasSubstr(
+          "plchost_uses_0[] = {\n  {0, &plchost_value_0, 0, 0},\n  {1, &plchost_value_1, 1, 0},\n  {0}}"));
 }
 
 TEST_F(MatiecGlue, RefusesOutputsThatShareBitsInTwoTasks) {
@@ -251,8 +253,8 @@ TEST_F(MatiecGlue, GivesEachTaskItsOwnValueOfAnInputOfItsPrograms) {
       "Main;";
   const Glue glue = write(kMain, kGo, kFast + slow, {{"INT", "__IW2", "%IW2"}});
   EXPECT_THAT(texts(glue.problems), IsEmpty());
-  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_input_0_0, 0}"));
-  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_input_1_0, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_input_0_0, 0, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_input_1_0, 0, 0}"));
   EXPECT_THAT(glue.text, HasSubstr("  __IW2 = &plchost_input_1_0;\n  MAIN_init__(&PRESS__TWO, 0);\n"));
 }
 

@@ -21,11 +21,12 @@ const struct plchost_place plchost_places[] = {
     {"__QB8", 'Q', 1, -1, 0, 8, &posts}};
 unsigned long long plchost_exchanged[11];
 
-static struct plchost_use of_fast[] = {{0, &go, 0},    {1, &raw, 0},  {2, &lamp, 0}, {3, &byte, 0},
-                                       {4, &twice, 0}, {6, &copy, 0}, {7, &flag, 0}, {9, &preset, 0}};
-static struct plchost_use of_edge[] = {{5, &edges, 0}};
-static struct plchost_use of_loop[] = {{7, &flag, 0}, {8, &loops, 0}};
-static struct plchost_use of_posted[] = {{10, &posts, 0}};
+static struct plchost_use of_fast[] = {{0, &go, 0, 0},   {1, &raw, 0, 0},   {2, &lamp, 0, 0},
+                                       {3, &byte, 0, 0}, {4, &twice, 0, 0}, {6, &copy, 0, 0},
+                                       {7, &flag, 0, 0}, {9, &preset, 0, 0}};
+static struct plchost_use of_edge[] = {{5, &edges, 0, 0}};
+static struct plchost_use of_loop[] = {{7, &flag, 0, 0}, {8, &loops, 0, 0}};
+static struct plchost_use of_posted[] = {{10, &posts, 0, 0}};
 
 static void run_fast(void) {
   plchost_begin(0);
