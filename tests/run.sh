@@ -22,6 +22,7 @@ case "${1:-}" in
     ;;
 esac
 build=.build/tests
+export PYTHONDONTWRITEBYTECODE=1  # the tree of the sources stays as it was
 export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
 step=0

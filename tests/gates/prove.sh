@@ -348,6 +348,12 @@ rm "$TMPDIR/planted"
 touch /dev/shm/plchost-planted
 must_be_red "left behind: a shared memory" "in /dev/shm: plchost-planted" left_behind
 rm /dev/shm/plchost-planted
+new_tree
+commit_tree
+touch "$plot/tree/tests/planted.pyc"
+left_in_sources() { (cd "$plot/tree" && "$gates/../left_behind.py" end "$plot/before"); }
+must_be_red "left behind: a file among the sources" "in the sources: tests/planted.pyc" left_in_sources
+rm "$plot/tree/tests/planted.pyc"
 # In a namespace of its own, whose mounts go with it. A user who may not mount cannot leave any behind.
 mount_and_look() { unshare --mount "$BASH" -c 'mount -t tmpfs planted "$TMPDIR" && tests/left_behind.py end "$1"' _ "$plot/before"; }
 if unshare --mount "$BASH" -c 'mount -t tmpfs planted "$TMPDIR"' 2>/dev/null; then
