@@ -166,6 +166,7 @@ plant_in_contract() {
   must_be_red "$1" "$2" "$gates/contract.sh" "$plot/tree"
 }
 plant_in_contract "contract: old reference" "reference.md is not up to date" 's,// of plchost-dds,// of the server,'
+plant_in_contract "contract: old copy" "control_v1.idl is not up to date: copy api/control.idl" 's,// of plchost-dds,// of the server,' --write
 plant_in_contract "contract: no comment" "Presence.pid has no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
 plant_in_contract "contract: no QoS" "LogPage has no 'qos:'" '/qos: as ObjectPage/d'
 plant_in_contract "contract: QoS that the generator does not know" "this QoS is not understood: RELIABLE 1 ms" 's/qos: RELIABLE \(1 ms\), KEEP_LAST 16/qos: RELIABLE 1 ms, KEEP_LAST 16/'
