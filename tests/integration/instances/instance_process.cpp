@@ -21,6 +21,7 @@
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 
@@ -164,7 +165,7 @@ ControlReply InstanceProcess::ask(ControlVerb verb, const std::string& argument)
   using namespace std::chrono_literals;
   PacketSocket socket = connect();
   EXPECT_TRUE(socket.send(encode(ControlRequest{77, verb, "line1", argument})));
-  const auto packet = socket.receive_until(MonotonicClock::now() + 20s);
+  const auto packet = receive_until(socket, MonotonicClock::now() + 20s);
   if (!packet) return {.number = 0, .code = packet.error().code, .text = packet.error().describe()};
   return decode_reply(*packet).value_or(
       ControlReply{.number = 0, .code = ErrorCode::corrupt, .text = *packet});
