@@ -86,8 +86,11 @@ TEST_F(ExceptionOfAnInstance, IsShownWithAllThatIsKnown) {
 
 // As a record on disk that somebody has changed.
 TEST_F(ExceptionOfAnInstance, OfAKindThatTheContractDoesNotHaveIsOfNone) {
-  auto history = ExceptionHistory{};
-  history.add({.unix_ns = 1, .task = "Fill", .kind = "boredom"});
+  ExceptionEntry entry;
+  entry.task = "Fill";
+  entry.kind = "boredom";
+  ExceptionHistory history;
+  history.add(entry);
   ASSERT_TRUE(write_exceptions(path(), history));
   ASSERT_TRUE(eventually_shown(1));
   EXPECT_EQ(shown("line1")->kind, 0U);
