@@ -44,7 +44,7 @@ enum class VariableType : std::uint8_t {
 /// A row of the table of types.
 struct VariableTypeTraits {
   VariableType type{};
-  std::string_view name;  ///< of IEC 61131-3: "INT"; layouts of one IEC type have the same
+  std::string_view name;    ///< of IEC 61131-3: "INT"; layouts of one IEC type have the same
   std::uint32_t bytes = 0;  ///< of a value; 0: of a string, each variable has its own
 };
 [[nodiscard]] std::span<const VariableTypeTraits> variable_types() noexcept;
@@ -53,17 +53,19 @@ struct VariableTypeTraits {
 [[nodiscard]] const VariableTypeTraits& traits_of(VariableType type) noexcept;
 [[nodiscard]] bool is_string(VariableType type) noexcept;
 
-/// A value as text, as Structured Text writes it: TRUE, -12, 16#00FF (BYTE to LWORD), 1.5, T#1s500ms, D#2026-11-25,
-/// TOD#12:30:00, DT#2026-11-25-12:30:00, 'text' with $ before ' and $, and $hh for what is not printable. The bytes
-/// are those of the variable: `value.size()` is that of its type, or the string's memory. Any bytes are allowed.
-/// What is out of a date's range is shown as its number. At most `most` bytes; a longer text is cut and ends in "...".
+/// A value as text, as Structured Text writes it: TRUE, -12, 16#00FF (BYTE to LWORD), 1.5, T#1s500ms,
+/// D#2026-11-25, TOD#12:30:00, DT#2026-11-25-12:30:00, 'text' with $ before ' and $, and $hh for what is not
+/// printable. The bytes are those of the variable: `value.size()` is that of its type, or the string's
+/// memory. Any bytes are allowed. What is out of a date's range is shown as its number. At most `most` bytes;
+/// a longer text is cut and ends in "...".
 [[nodiscard]] std::string variable_text(VariableType type, std::span<const std::byte> value,
                                         std::size_t most = 255);
 
 /// The bytes of a text, into `value`, whose size is that of the type or the string's memory. Allowed is what
-/// variable_text() writes, also without the type's prefix, and integers in each base of IEC 61131-3 (2#, 8#, 16#,
-/// with _ between digits). TRUE, FALSE, 1, 0 of a BOOL, in any case. A text without quotes is a string, too.
-/// invalid_argument: says what is allowed, with the range. `value` is unchanged then.
-[[nodiscard]] Result<void> parse_variable(VariableType type, std::string_view text, std::span<std::byte> value);
+/// variable_text() writes, also without the type's prefix, and integers in each base of IEC 61131-3 (2#, 8#,
+/// 16#, with _ between digits). TRUE, FALSE, 1, 0 of a BOOL, in any case. A text without quotes is a string,
+/// too. invalid_argument: says what is allowed, with the range. `value` is unchanged then.
+[[nodiscard]] Result<void> parse_variable(VariableType type, std::string_view text,
+                                          std::span<std::byte> value);
 
 }  // namespace plchost
