@@ -1,21 +1,22 @@
 /*
  * Variables that can be seen, written and forced from outside, a part of plc_app.h.
  *
- * An application declares each of them once, by name, in its plc_app_init. Then "plcctl list variables", "read",
- * "write", "force" and "watch" find it. A variable that is not declared is invisible. Declaring costs memory of
- * the control thread only: the cycle of a task is not longer, unless one of its variables is forced.
+ * An application declares each of them once, by name, in its plc_app_init. Then "plcctl list variables",
+ * "read", "write", "force" and "watch" find it. A variable that is not declared is invisible. Declaring costs
+ * memory of the control thread only: the cycle of a task is not longer, unless one of its variables is
+ * forced.
  *
  *     static short speed;
  *     PLC_DECLARE_VARIABLE("Main.speed", PLC_TYPE_INT, speed);
  *
- * Order of a cycle: inputs, forces, code, forces, outputs. Writes are made between two cycles, when no task is
- * within one. A forced variable has the value that it was forced to at the begin of each cycle and at its end;
- * in between the code may write another one. Forces end with the process: also in a reset.
+ * Order of a cycle: inputs, forces, code, forces, outputs. Writes are made between two cycles, when no task
+ * is within one. A forced variable has the value that it was forced to at the begin of each cycle and at its
+ * end; in between the code may write another one. Forces end with the process: also in a reset.
  *
- * Names. 1 to PLC_MAX_VARIABLE_NAME characters: words of letters, digits and _ with dots between them. They are
- * compared without regard to case, as in IEC 61131-3. Each dimension of an array is a "[]" in the name: "Line.temperature[]"
- * is an array, "Grid[][]" one of two dimensions, "Pump[].speed" a member of each structure of an array. Its elements
- * are "Line.temperature[3]", "Grid[1,2]", "Pump[2].speed".
+ * Names. 1 to PLC_MAX_SYMBOL_NAME characters: words of letters, digits and _ with dots between them. They
+ * are compared without regard to case, as in IEC 61131-3. Each dimension of an array is a "[]" in the name:
+ * "Line.temperature[]" is an array, "Grid[][]" one of two dimensions, "Pump[].speed" a member of each
+ * structure of an array. Its elements are "Line.temperature[3]", "Grid[1,2]", "Pump[2].speed".
  */
 #ifndef PLC_VARIABLES_H
 #define PLC_VARIABLES_H
@@ -55,6 +56,7 @@ extern "C" {
 #define PLC_TYPE_COUNTED_STRING 25u         /* 1 byte: the length; then dwBytes - 1 of characters */
 
 #define PLC_MAX_DECLARED_VARIABLES 65536u
+#define PLC_MAX_SYMBOL_NAME 250
 #define PLC_MAX_DIMENSIONS 3
 #define PLC_MAX_STRING 4096u /* bytes of a string's memory */
 
@@ -82,24 +84,24 @@ typedef struct {
 } Plc_Variable;
 
 /* Declares a variable. From plc_app_init only. ERR_OK; ERR_PARAMETER: null, dwSize, a name, type, size or
- * dimension that is not allowed (the log says which); ERR_DUPLICATE: one of that name; ERR_NOMEMORY: there are
- * PLC_MAX_DECLARED_VARIABLES; ERR_NOTINITIALIZED. A task that is not there, and an address that is none of this
- * process, are reported by the runtime after plc_app_init has returned. Control. */
+ * dimension that is not allowed (the log says which); ERR_DUPLICATE: one of that name; ERR_NOMEMORY: there
+ * are PLC_MAX_DECLARED_VARIABLES; ERR_NOTINITIALIZED. A task that is not there, and an address that is none
+ * of this process, are reported by the runtime after plc_app_init has returned. Control. */
 RTS_RESULT CDECL plc_declare_variable(const Plc_Variable* pVariable);
 
-/* Gives the forced variables of the task whose cycle runs on this thread their values. The runtime does that by
- * itself before and after the task's function. An application that takes inputs or puts outputs out within that
- * function calls it behind the one and before the other. Any, real-time. */
+/* Gives the forced variables of the task whose cycle runs on this thread their values. The runtime does that
+ * by itself before and after the task's function. An application that takes inputs or puts outputs out within
+ * that function calls it behind the one and before the other. Any, real-time. */
 void CDECL plc_apply_forces(void);
 
 /* Declares a variable that is no array and no string. */
-#define PLC_DECLARE_VARIABLE(name, type, variable)                                          \
-  do {                                                                                      \
+#define PLC_DECLARE_VARIABLE(name, type, variable)                                            \
+  do {                                                                                        \
     Plc_Variable plc_declared_ = {sizeof(Plc_Variable), 0, 0, 0, 0, 0, 0, {{0, 0, 0}}, 0, 0}; \
-    plc_declared_.pszName = (name);                                                         \
-    plc_declared_.dwType = (type);                                                          \
-    plc_declared_.pAddress = &(variable);                                                   \
-    plc_declare_variable(&plc_declared_);                                                   \
+    plc_declared_.pszName = (name);                                                           \
+    plc_declared_.dwType = (type);                                                            \
+    plc_declared_.pAddress = &(variable);                                                     \
+    plc_declare_variable(&plc_declared_);                                                     \
   } while (0)
 
 #ifdef __cplusplus

@@ -14,9 +14,9 @@
 
 namespace plchost {
 
-// The packets of RUN_DIRECTORY/INSTANCE.vals, on which the API server asks an instance for values. Binary,
-// of one machine: a request names up to kMaxRequestedValues elements of one table. The instance copies all of
-// them in one moment in which no task is within a cycle, and answers in one or several packets of up to
+// The packets of RUN_DIRECTORY/INSTANCE.vals, on which the API server asks an instance for values. Binary, of
+// one machine: a request names up to kMaxRequestedValues elements of one table. The instance copies all of
+// them in one moment in which no task is within a cycle. It answers in one or several packets of up to
 // kMaxPacket bytes, in order. A connection has one request at a time: the next one is sent when the reply has
 // come.
 
@@ -43,7 +43,7 @@ struct ValueRequest {
 struct ValueReply {
   std::uint64_t number = 0;
   /// wrong_state: the table is another one by now, or none: open it anew. not_found: an element that the
-  /// table does not have. full. busy: there are too many connections. corrupt: what came is no request. With
+  /// table does not have. full. busy: there are too many connections. corrupt: the packet is no request. With
   /// these there is nothing else in it.
   ErrorCode code = ErrorCode::ok;
   bool consistent = false;        ///< no task was within a cycle

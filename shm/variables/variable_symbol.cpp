@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kIndex = "[]";
 
-// Whatever the locale is.
+// In each locale the same.
 unsigned char folded(char c) noexcept {
   return static_cast<unsigned char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
 }

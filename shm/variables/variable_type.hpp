@@ -53,11 +53,11 @@ struct VariableTypeTraits {
 [[nodiscard]] const VariableTypeTraits& traits_of(VariableType type) noexcept;
 [[nodiscard]] bool is_string(VariableType type) noexcept;
 
-/// A value as text, as Structured Text writes it: TRUE, -12, 16#00FF (BYTE to LWORD), 1.5, T#1s500ms,
-/// D#2026-11-25, TOD#12:30:00, DT#2026-11-25-12:30:00, 'text' with $ before ' and $, and $hh for what is not
-/// printable. The bytes are those of the variable: `value.size()` is that of its type, or the string's
-/// memory. Any bytes are allowed. What is out of a date's range is shown as its number. At most `most` bytes;
-/// a longer text is cut and ends in "...".
+/// A value as text, as Structured Text writes it. BOOL: TRUE. Integers: -12. BYTE to LWORD: 16#00FF.
+/// REAL: 1.5. Times: T#1s500ms, D#2026-11-25, TOD#12:30:00, DT#2026-11-25-12:30:00. STRING: 'text' with $
+/// before ' and $, and $hh for characters that are not printable. The bytes are those of the variable:
+/// `value.size()` is that of its type, or the string's memory. Any bytes are allowed. A time that is out of
+/// its range is shown as its number. At most `most` bytes; a longer text is cut and ends in "...".
 [[nodiscard]] std::string variable_text(VariableType type, std::span<const std::byte> value,
                                         std::size_t most = 255);
 
