@@ -191,6 +191,7 @@ int main(int argc, char** argv) {
   plchost::add_check_verb(plcctl, session);
   plchost::add_post_verb(plcctl, session);
   plchost::add_logs_verb(plcctl, session);
+  plchost::add_variable_verbs(plcctl, session);
   plchost::add_wait_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);

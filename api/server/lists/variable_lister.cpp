@@ -1,0 +1,206 @@
+#include "api/server/lists/variable_lister.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+
+#include "api/dds/sample_identity.hpp"
+#include "shm/base/system_call.hpp"
+
+namespace plchost {
+
+namespace {
+
+Error named(Error error, const std::string& instance) {
+  error.message = fmt::format("instance '{}': {}", instance, error.message);
+  return error;
+}
+
+}  // namespace
+
+Result<VariableLister> VariableLister::create(std::string pool, std::string run_directory) {
+  PLCHOST_TRY_ASSIGN(const auto epoll,
+                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor"));
+  return VariableLister(std::move(pool), std::move(run_directory), UniqueFd(epoll));
+}
+
+Result<void> VariableLister::begin(Asker asker, VariableQuery query, TimePoint now) {
+  const auto of_client = std::ranges::count_if(
+      pending_, [&](const auto& entry) { return entry.second.asker.client == asker.client; });
+  if (pending_.size() >= kMaxPending || of_client >= std::ptrdiff_t{kMaxPendingOfClient}) {
+    return failure(ErrorCode::busy,
+                   fmt::format("{} lists of variables are under way; ask again", pending_.size()));
+  }
+  Pending pending{.asker = std::move(asker), .query = std::move(query), .deadline = now + kPatience};
+  const std::uint64_t number = next_number_++;
+  if (const auto asked = ask_for_forced(pending, number); !asked)
+    return std::unexpected(named(asked.error(), pending.asker.instance));
+  pending_.emplace(number, std::move(pending));
+  return {};
+}
+
+bool VariableLister::is_pending(const plc_SampleIdentity& identity) const {
+  return std::ranges::any_of(
+      pending_, [&](const auto& entry) { return same_identity(entry.second.asker.identity, identity); });
+}
+
+// Made at the first list of an instance, and again when its process was another one.
+Result<void> VariableLister::connect(const std::string& instance) {
+  if (peers_.contains(instance)) return {};
+  PLCHOST_TRY_ASSIGN(auto table, SymbolTable::open(pool_, instance));
+  PLCHOST_TRY_ASSIGN(auto link, ValueLink::connect(run_directory_, instance));
+  const int fd = link.fd();
+  epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
+  PLCHOST_TRY(check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "watch the values socket"));
+  peers_.emplace(instance, Peer{.link = std::move(link),
+                                .table = std::make_shared<const SymbolTable>(std::move(table))});
+  return {};
+}
+
+// What is forced is asked for first: of a list of forced values it says which.
+Result<void> VariableLister::ask_for_forced(Pending& pending, std::uint64_t number) {
+  const std::string& instance = pending.asker.instance;
+  for (bool again = true;; again = false) {
+    const bool known = peers_.contains(instance);
+    PLCHOST_TRY(connect(instance));
+    pending.table = peers_.at(instance).table;
+    const auto sent = send(
+        pending,
+        {.number = number, .stream = pending.table->stream(), .kind = ValueKind::forced, .elements = {}});
+    const bool ended = !sent && sent.error().code == ErrorCode::unavailable;
+    if (!ended || !known || !again) return sent;
+    peers_.erase(instance);
+  }
+}
+
+Result<void> VariableLister::send(const Pending& pending, const ValueRequest& request) {
+  const auto peer = peers_.find(pending.asker.instance);
+  if (peer == peers_.end()) return failure(ErrorCode::unavailable, "its process has ended; ask again");
+  return peer->second.link.send(request);
+}
+
+// Whether there is anything to ask for.
+Result<bool> VariableLister::select(Pending& pending, std::uint64_t number) {
+  PLCHOST_TRY_ASSIGN(pending.selection,
+                     pending.query.forced
+                         ? select_forced(*pending.table, pending.query, pending.forced->elements)
+                         : select_variables(*pending.table, pending.query));
+  if (pending.selection.elements.empty()) return false;
+  PLCHOST_TRY(send(pending, {.number = number,
+                             .stream = pending.table->stream(),
+                             .kind = ValueKind::current,
+                             .elements = pending.selection.elements}));
+  return true;
+}
+
+// Another application, or version, has taken over since the table was read.
+Result<void> VariableLister::renew(Pending& pending, std::uint64_t number) {
+  if (std::exchange(pending.renewed, true)) {
+    return failure(ErrorCode::busy, "its application changes again and again; ask again");
+  }
+  const auto peer = peers_.find(pending.asker.instance);
+  if (peer == peers_.end()) return failure(ErrorCode::unavailable, "its process has ended; ask again");
+  PLCHOST_TRY_ASSIGN(auto table, SymbolTable::open(pool_, pending.asker.instance));
+  peer->second.table = std::make_shared<const SymbolTable>(std::move(table));
+  pending.forced.reset();
+  return ask_for_forced(pending, number);
+}
+
+std::optional<Result<VariableListing>> VariableLister::take(Pending& pending, ValueReply reply) {
+  using Done = Result<VariableListing>;
+  const std::uint64_t number = reply.number;
+  if (reply.code == ErrorCode::wrong_state) {
+    const auto renewed = renew(pending, number);
+    return renewed ? std::nullopt : std::optional(Done(std::unexpected(renewed.error())));
+  }
+  if (reply.code != ErrorCode::ok) {
+    return Done(
+        failure(reply.code, "its process does not give these values: " + std::string(to_string(reply.code))));
+  }
+  if (!pending.forced) {
+    pending.forced = std::move(reply);
+    const auto goes_on = select(pending, number);
+    if (!goes_on) return Done(std::unexpected(goes_on.error()));
+    if (*goes_on) return std::nullopt;
+    reply = *pending.forced;
+    reply.elements.clear();
+    reply.values.clear();
+  }
+  return Done(
+      VariableListing{.stream = pending.table->stream(),
+                      .time_unix_ns = reply.time_unix_ns,
+                      .time_monotonic_ns = reply.time_monotonic_ns,
+                      .consistent = reply.consistent,
+                      .complete = pending.selection.complete,
+                      .next_after = pending.selection.next_after,
+                      .variables = records_of(*pending.table, pending.selection, reply, *pending.forced)});
+}
+
+void VariableLister::drop(const std::string& instance, const Error& why, std::vector<Finished>& finished) {
+  peers_.erase(instance);
+  for (auto entry = pending_.begin(); entry != pending_.end();) {
+    if (entry->second.asker.instance != instance) {
+      ++entry;
+      continue;
+    }
+    finished.push_back({std::move(entry->second.asker), std::unexpected(named(why, instance))});
+    entry = pending_.erase(entry);
+  }
+}
+
+void VariableLister::take_from(const std::string& instance, std::vector<Finished>& finished) {
+  auto replies = peers_.at(instance).link.receive();
+  if (!replies) {
+    const bool ended = replies.error().code == ErrorCode::unavailable;
+    return drop(instance,
+                ended ? Error{.code = ErrorCode::unavailable,
+                              .system_errno = 0,
+                              .message = "its process has ended; ask again"}
+                      : replies.error(),
+                finished);
+  }
+  for (ValueReply& reply : *replies) {
+    const auto found = pending_.find(reply.number);
+    if (found == pending_.end()) continue;  // given up meanwhile
+    auto listing = take(found->second, std::move(reply));
+    if (!listing) continue;
+    if (!*listing) *listing = std::unexpected(named(listing->error(), instance));
+    finished.push_back({std::move(found->second.asker), *std::move(listing)});
+    pending_.erase(found);
+  }
+}
+
+std::vector<VariableLister::Finished> VariableLister::receive() {
+  std::vector<Finished> finished;
+  std::array<epoll_event, 16> events{};
+  const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
+  for (int i = 0; i < count; ++i) {
+    const int fd = events[static_cast<std::size_t>(i)].data.fd;
+    const auto ready =
+        std::ranges::find_if(peers_, [&](const auto& peer) { return peer.second.link.fd() == fd; });
+    if (ready != peers_.end()) take_from(std::string(ready->first), finished);
+  }
+  return finished;
+}
+
+std::vector<VariableLister::Finished> VariableLister::expire(TimePoint now) {
+  std::vector<Finished> finished;
+  for (auto entry = pending_.begin(); entry != pending_.end();) {
+    if (now < entry->second.deadline) {
+      ++entry;
+      continue;
+    }
+    Asker& asker = entry->second.asker;
+    auto late =
+        failure(ErrorCode::timed_out, fmt::format("instance '{}' has not answered within {} ms",
+                                                  asker.instance, kPatience / std::chrono::milliseconds(1)));
+    finished.push_back({std::move(asker), std::move(late)});
+    entry = pending_.erase(entry);
+  }
+  return finished;
+}
+
+}  // namespace plchost
