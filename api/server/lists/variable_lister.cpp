@@ -14,6 +14,10 @@ namespace plchost {
 
 namespace {
 
+Error process_has_ended() {
+  return {.code = ErrorCode::unavailable, .system_errno = 0, .message = "its process has ended; ask again"};
+}
+
 Error named(Error error, const std::string& instance) {
   error.message = fmt::format("instance '{}': {}", instance, error.message);
   return error;
@@ -76,10 +80,20 @@ Result<void> VariableLister::ask_for_forced(Pending& pending, std::uint64_t numb
   }
 }
 
-Result<void> VariableLister::send(const Pending& pending, const ValueRequest& request) {
+Result<void> VariableLister::send(const Pending& pending, ValueRequest request) {
   const auto peer = peers_.find(pending.asker.instance);
-  if (peer == peers_.end()) return failure(ErrorCode::unavailable, "its process has ended; ask again");
-  return peer->second.link.send(request);
+  if (peer == peers_.end()) return std::unexpected(process_has_ended());
+  return peer->second.ask(std::move(request));
+}
+
+Result<void> VariableLister::Peer::ask(ValueRequest request) {
+  requests.push_back(std::move(request));
+  return requests.size() == 1 ? link.send(requests.front()) : Result<void>();
+}
+
+Result<void> VariableLister::Peer::ask_next() {
+  if (!requests.empty()) requests.pop_front();
+  return requests.empty() ? Result<void>() : link.send(requests.front());
 }
 
 // Whether there is anything to ask for.
@@ -102,7 +116,7 @@ Result<void> VariableLister::renew(Pending& pending, std::uint64_t number) {
     return failure(ErrorCode::busy, "its application changes again and again; ask again");
   }
   const auto peer = peers_.find(pending.asker.instance);
-  if (peer == peers_.end()) return failure(ErrorCode::unavailable, "its process has ended; ask again");
+  if (peer == peers_.end()) return std::unexpected(process_has_ended());
   PLCHOST_TRY_ASSIGN(auto table, SymbolTable::open(pool_, pending.asker.instance));
   peer->second.table = std::make_shared<const SymbolTable>(std::move(table));
   pending.forced.reset();
@@ -155,14 +169,11 @@ void VariableLister::take_from(const std::string& instance, std::vector<Finished
   auto replies = peers_.at(instance).link.receive();
   if (!replies) {
     const bool ended = replies.error().code == ErrorCode::unavailable;
-    return drop(instance,
-                ended ? Error{.code = ErrorCode::unavailable,
-                              .system_errno = 0,
-                              .message = "its process has ended; ask again"}
-                      : replies.error(),
-                finished);
+    return drop(instance, ended ? process_has_ended() : replies.error(), finished);
   }
   for (ValueReply& reply : *replies) {
+    if (const auto asked = peers_.at(instance).ask_next(); !asked)
+      return drop(instance, asked.error(), finished);
     const auto found = pending_.find(reply.number);
     if (found == pending_.end()) continue;  // given up meanwhile
     auto listing = take(found->second, std::move(reply));
@@ -188,19 +199,18 @@ std::vector<VariableLister::Finished> VariableLister::receive() {
 
 std::vector<VariableLister::Finished> VariableLister::expire(TimePoint now) {
   std::vector<Finished> finished;
-  for (auto entry = pending_.begin(); entry != pending_.end();) {
-    if (now < entry->second.deadline) {
-      ++entry;
-      continue;
-    }
-    Asker& asker = entry->second.asker;
-    auto late =
-        failure(ErrorCode::timed_out, fmt::format("instance '{}' has not answered within {} ms",
-                                                  asker.instance, kPatience / std::chrono::milliseconds(1)));
-    finished.push_back({std::move(asker), std::move(late)});
-    entry = pending_.erase(entry);
+  for (;;) {
+    const auto late =
+        std::ranges::find_if(pending_, [&](const auto& entry) { return now >= entry.second.deadline; });
+    if (late == pending_.end()) return finished;
+    // The others wait behind it.
+    drop(std::string(late->second.asker.instance),
+         {.code = ErrorCode::timed_out,
+          .system_errno = 0,
+          .message =
+              fmt::format("it has not answered within {} ms", kPatience / std::chrono::milliseconds(1))},
+         finished);
   }
-  return finished;
 }
 
 }  // namespace plchost

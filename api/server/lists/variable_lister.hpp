@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -66,6 +67,11 @@ class VariableLister {
   struct Peer {
     ValueLink link;
     std::shared_ptr<const SymbolTable> table;
+    std::deque<ValueRequest> requests = {};  // the first one is under way
+    /// Puts it behind the others.
+    [[nodiscard]] Result<void> ask(ValueRequest request);
+    /// The first one has its reply.
+    [[nodiscard]] Result<void> ask_next();
   };
 
   VariableLister(std::string pool, std::string run_directory, UniqueFd epoll)
@@ -73,7 +79,7 @@ class VariableLister {
   [[nodiscard]] Result<void> connect(const std::string& instance);
   /// Asks for the forced values by the newest table. A connection to a process that has ended is made anew.
   [[nodiscard]] Result<void> ask_for_forced(Pending& pending, std::uint64_t number);
-  [[nodiscard]] Result<void> send(const Pending& pending, const ValueRequest& request);
+  [[nodiscard]] Result<void> send(const Pending& pending, ValueRequest request);
   /// Goes on with a reply. Nothing: it is not done yet.
   [[nodiscard]] std::optional<Result<VariableListing>> take(Pending& pending, ValueReply reply);
   [[nodiscard]] Result<bool> select(Pending& pending, std::uint64_t number);
