@@ -40,7 +40,7 @@ Result<void> VariableLister::begin(Asker asker, VariableQuery query, TimePoint n
   }
   Pending pending{.asker = std::move(asker), .query = std::move(query), .deadline = now + kPatience};
   const std::uint64_t number = next_number_++;
-  if (const auto asked = ask_for_forced(pending, number); !asked)
+  if (const auto asked = ask_first(pending, number); !asked)
     return std::unexpected(named(asked.error(), pending.asker.instance));
   pending_.emplace(number, std::move(pending));
   return {};
@@ -64,50 +64,52 @@ Result<void> VariableLister::connect(const std::string& instance) {
   return {};
 }
 
-// What is forced is asked for first: of a list of forced values it says which.
-Result<void> VariableLister::ask_for_forced(Pending& pending, std::uint64_t number) {
+Result<void> VariableLister::ask_first(Pending& pending, std::uint64_t number) {
   const std::string& instance = pending.asker.instance;
   for (bool again = true;; again = false) {
     const bool known = peers_.contains(instance);
     PLCHOST_TRY(connect(instance));
     pending.table = peers_.at(instance).table;
-    const auto sent = send(
-        pending,
-        {.number = number, .stream = pending.table->stream(), .kind = ValueKind::forced, .elements = {}});
-    const bool ended = !sent && sent.error().code == ErrorCode::unavailable;
-    if (!ended || !known || !again) return sent;
+    pending.current.reset();
+    pending.forced.reset();
+    if (!pending.query.forced) {
+      PLCHOST_TRY(select(pending));
+    }
+    const auto asked = ask(pending, number, pending.query.forced ? ValueKind::forced : ValueKind::current);
+    const bool ended = !asked && asked.error().code == ErrorCode::unavailable;
+    if (!ended || !known || !again) return asked;
     peers_.erase(instance);
   }
 }
 
-Result<void> VariableLister::send(const Pending& pending, ValueRequest request) {
+Result<void> VariableLister::select(Pending& pending) {
+  PLCHOST_TRY_ASSIGN(pending.selection,
+                     pending.query.forced
+                         ? select_forced(*pending.table, pending.query, pending.forced->elements)
+                         : select_variables(*pending.table, pending.query));
+  return {};
+}
+
+Result<void> VariableLister::ask(Pending& pending, std::uint64_t number, ValueKind kind) {
   const auto peer = peers_.find(pending.asker.instance);
   if (peer == peers_.end()) return std::unexpected(process_has_ended());
+  pending.asked = kind;
+  ValueRequest request{.number = number, .stream = pending.table->stream(), .kind = kind, .elements = {}};
+  if (kind == ValueKind::current) request.elements = pending.selection.elements;
   return peer->second.ask(std::move(request));
 }
 
 Result<void> VariableLister::Peer::ask(ValueRequest request) {
+  if (requests.empty()) {
+    PLCHOST_TRY(link.send(request));
+  }
   requests.push_back(std::move(request));
-  return requests.size() == 1 ? link.send(requests.front()) : Result<void>();
+  return {};
 }
 
 Result<void> VariableLister::Peer::ask_next() {
   if (!requests.empty()) requests.pop_front();
   return requests.empty() ? Result<void>() : link.send(requests.front());
-}
-
-// Whether there is anything to ask for.
-Result<bool> VariableLister::select(Pending& pending, std::uint64_t number) {
-  PLCHOST_TRY_ASSIGN(pending.selection,
-                     pending.query.forced
-                         ? select_forced(*pending.table, pending.query, pending.forced->elements)
-                         : select_variables(*pending.table, pending.query));
-  if (pending.selection.elements.empty()) return false;
-  PLCHOST_TRY(send(pending, {.number = number,
-                             .stream = pending.table->stream(),
-                             .kind = ValueKind::current,
-                             .elements = pending.selection.elements}));
-  return true;
 }
 
 // Another application, or version, has taken over since the table was read.
@@ -119,8 +121,27 @@ Result<void> VariableLister::renew(Pending& pending, std::uint64_t number) {
   if (peer == peers_.end()) return std::unexpected(process_has_ended());
   PLCHOST_TRY_ASSIGN(auto table, SymbolTable::open(pool_, pending.asker.instance));
   peer->second.table = std::make_shared<const SymbolTable>(std::move(table));
-  pending.forced.reset();
-  return ask_for_forced(pending, number);
+  return ask_first(pending, number);
+}
+
+// Whether there is something else to ask for. Of a whole array not all elements are shown, and any may be
+// forced.
+Result<bool> VariableLister::go_on(Pending& pending, std::uint64_t number) {
+  if (!pending.current) {
+    PLCHOST_TRY(select(pending));
+    if (pending.selection.elements.empty()) return false;
+    PLCHOST_TRY(ask(pending, number, ValueKind::current));
+    return true;
+  }
+  if (pending.forced) return false;
+  const auto is_array = [&](const SelectedVariable& row) {
+    return !row.element && row.count < pending.table->symbols()[row.symbol].elements();
+  };
+  const bool any = std::ranges::any_of(pending.current->forced, [](auto forced) { return forced != 0; }) ||
+                   std::ranges::any_of(pending.selection.rows, is_array);
+  if (!any) return false;
+  PLCHOST_TRY(ask(pending, number, ValueKind::forced));
+  return true;
 }
 
 std::optional<Result<VariableListing>> VariableLister::take(Pending& pending, ValueReply reply) {
@@ -131,26 +152,24 @@ std::optional<Result<VariableListing>> VariableLister::take(Pending& pending, Va
     return renewed ? std::nullopt : std::optional(Done(std::unexpected(renewed.error())));
   }
   if (reply.code != ErrorCode::ok) {
-    return Done(
-        failure(reply.code, "its process does not give these values: " + std::string(to_string(reply.code))));
+    return Done(failure(reply.code,
+                        fmt::format("its process does not give these values ({})", to_string(reply.code))));
   }
-  if (!pending.forced) {
-    pending.forced = std::move(reply);
-    const auto goes_on = select(pending, number);
-    if (!goes_on) return Done(std::unexpected(goes_on.error()));
-    if (*goes_on) return std::nullopt;
-    reply = *pending.forced;
-    reply.elements.clear();
-    reply.values.clear();
-  }
-  return Done(
-      VariableListing{.stream = pending.table->stream(),
-                      .time_unix_ns = reply.time_unix_ns,
-                      .time_monotonic_ns = reply.time_monotonic_ns,
-                      .consistent = reply.consistent,
-                      .complete = pending.selection.complete,
-                      .next_after = pending.selection.next_after,
-                      .variables = records_of(*pending.table, pending.selection, reply, *pending.forced)});
+  (pending.asked == ValueKind::forced ? pending.forced : pending.current) = std::move(reply);
+  const auto goes_on = go_on(pending, number);
+  if (!goes_on) return Done(std::unexpected(goes_on.error()));
+  if (*goes_on) return std::nullopt;
+  const ValueReply none;
+  const ValueReply& current = pending.current ? *pending.current : none;
+  const ValueReply& forced = pending.forced ? *pending.forced : none;
+  const ValueReply& told = pending.current ? current : forced;
+  return Done(VariableListing{.stream = pending.table->stream(),
+                              .time_unix_ns = told.time_unix_ns,
+                              .time_monotonic_ns = told.time_monotonic_ns,
+                              .consistent = told.consistent,
+                              .complete = pending.selection.complete,
+                              .next_after = pending.selection.next_after,
+                              .variables = records_of(*pending.table, pending.selection, current, forced)});
 }
 
 void VariableLister::drop(const std::string& instance, const Error& why, std::vector<Finished>& finished) {

@@ -60,9 +60,11 @@ class VariableLister {
     VariableQuery query;
     TimePoint deadline;
     std::shared_ptr<const SymbolTable> table = {};
-    std::optional<ValueReply> forced = {};  // nothing: they are asked for
     VariableSelection selection = {};
-    bool renewed = false;  // the table has changed meanwhile
+    ValueKind asked = ValueKind::current;    // the reply that comes next
+    std::optional<ValueReply> current = {};  // of the selection; nothing: they are asked for
+    std::optional<ValueReply> forced = {};   // the same of those that are forced
+    bool renewed = false;                    // the table has changed meanwhile
   };
   struct Peer {
     ValueLink link;
@@ -77,12 +79,13 @@ class VariableLister {
   VariableLister(std::string pool, std::string run_directory, UniqueFd epoll)
       : pool_(std::move(pool)), run_directory_(std::move(run_directory)), epoll_(std::move(epoll)) {}
   [[nodiscard]] Result<void> connect(const std::string& instance);
-  /// Asks for the forced values by the newest table. A connection to a process that has ended is made anew.
-  [[nodiscard]] Result<void> ask_for_forced(Pending& pending, std::uint64_t number);
-  [[nodiscard]] Result<void> send(const Pending& pending, ValueRequest request);
+  /// Asks by the newest table. A connection to a process that has ended is made anew.
+  [[nodiscard]] Result<void> ask_first(Pending& pending, std::uint64_t number);
+  [[nodiscard]] Result<void> select(Pending& pending);
+  [[nodiscard]] Result<void> ask(Pending& pending, std::uint64_t number, ValueKind kind);
   /// Goes on with a reply. Nothing: it is not done yet.
   [[nodiscard]] std::optional<Result<VariableListing>> take(Pending& pending, ValueReply reply);
-  [[nodiscard]] Result<bool> select(Pending& pending, std::uint64_t number);
+  [[nodiscard]] Result<bool> go_on(Pending& pending, std::uint64_t number);
   [[nodiscard]] Result<void> renew(Pending& pending, std::uint64_t number);
   void take_from(const std::string& instance, std::vector<Finished>& finished);
   void drop(const std::string& instance, const Error& why, std::vector<Finished>& finished);
