@@ -1,7 +1,6 @@
 #include "shm/variables/value_message.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -74,7 +73,7 @@ void append(std::string& text, const Head& head) {
 template <class Item>
 std::vector<Item> take_items(std::string_view& bytes, std::size_t count) {
   std::vector<Item> items(count);
-  if (count > 0) std::memcpy(items.data(), bytes.data(), count * sizeof(Item));
+  (void)bytes.copy(reinterpret_cast<char*>(items.data()), count * sizeof(Item));
   bytes.remove_prefix(count * sizeof(Item));
   return items;
 }
@@ -82,7 +81,7 @@ std::vector<Item> take_items(std::string_view& bytes, std::size_t count) {
 template <class Head>
 bool take_head(std::string_view& bytes, Head& head) {
   if (bytes.size() < sizeof head) return false;
-  std::memcpy(&head, bytes.data(), sizeof head);
+  (void)bytes.copy(reinterpret_cast<char*>(&head), sizeof head);
   bytes.remove_prefix(sizeof head);
   return true;
 }

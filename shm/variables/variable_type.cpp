@@ -291,9 +291,9 @@ std::optional<char> take_escape(std::string_view& text) {
   }
   unsigned code = 0;
   constexpr int kHexadecimal = 16;
-  if (text.size() < 2 ||
-      std::from_chars(text.data(), text.data() + 2, code, kHexadecimal).ptr != text.data() + 2)
-    return std::nullopt;
+  const std::string_view digits = text.substr(0, 2);
+  const auto parsed = std::from_chars(digits.begin(), digits.end(), code, kHexadecimal);
+  if (digits.size() < 2 || parsed.ptr != digits.end()) return std::nullopt;
   text.remove_prefix(2);
   return static_cast<char>(code);
 }

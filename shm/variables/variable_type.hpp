@@ -14,9 +14,9 @@ namespace plchost {
 
 /// The types of variables: PLC_TYPE_... of instances/plc_variables.h.
 enum class VariableType : std::uint8_t {
-  bool_ = 1,
+  bool_ = 1,  // NOLINT(readability-identifier-naming): a keyword
   sint,
-  int_,
+  int_,  // NOLINT(readability-identifier-naming): a keyword
   dint,
   lint,
   usint,

@@ -74,8 +74,11 @@ void Instance::advance_orders() {
     Result<void> fine;
     if (!first.order) {
       auto order = variables.order(kind_of(first.verb), first.argument);
-      if (order) first.order = *std::move(order);
-      if (!order) fine = std::unexpected(std::move(order).error());
+      if (order) {
+        first.order = *std::move(order);
+      } else {
+        fine = std::unexpected(std::move(order).error());
+      }
     }
     if (fine && !in_moment([&] { variables.make(*first.order); })) {
       if (MonotonicClock::now() < first.limit) return;

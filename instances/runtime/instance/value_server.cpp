@@ -39,11 +39,13 @@ bool ValueServer::take(std::uint64_t connection, const Result<std::string>& pack
 // Those that need no sample are answered. Memory for the others is there before any task is held up.
 void ValueServer::prepare() {
   std::erase_if(waiting_, [&](Waiting& one) {
+    const bool needs_sample = one.request.kind == ValueKind::current;
     auto plan = variables_->plan(one.request);
-    const bool forced = one.request.kind == ValueKind::forced;
     if (!plan) {
       refuse(one.connection, one.request.number, plan.error().code);
-    } else if (forced) {
+      return true;
+    }
+    if (!needs_sample) {
       ValueReply reply = variables_->forced_values();
       reply.number = one.request.number;
       reply.time_unix_ns = unix_time_ns();
@@ -55,7 +57,7 @@ void ValueServer::prepare() {
       one.reply.forced = variables_->marks(one.request.elements);
       one.reply.values.resize(one.plan.bytes);
     }
-    return !plan || forced;
+    return !needs_sample;
   });
 }
 

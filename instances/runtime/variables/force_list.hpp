@@ -15,7 +15,7 @@ inline void store_value(std::byte* to, std::span<const std::byte> bytes) noexcep
     std::memcpy(&word, bytes.data(), sizeof word);
     __atomic_store_n(reinterpret_cast<Word*>(to), word, __ATOMIC_RELAXED);
   };
-  const bool aligned = reinterpret_cast<std::uintptr_t>(to) % bytes.size() == 0;
+  const bool aligned = (reinterpret_cast<std::uintptr_t>(to) & (bytes.size() - 1)) == 0;  // of a power of two
   if (bytes.size() == sizeof(std::uint8_t)) return whole(std::uint8_t{});
   if (aligned && bytes.size() == sizeof(std::uint16_t)) return whole(std::uint16_t{});
   if (aligned && bytes.size() == sizeof(std::uint32_t)) return whole(std::uint32_t{});

@@ -23,8 +23,8 @@ MemoryMap MemoryMap::parse(std::string_view maps) {
     const std::string_view line = maps.substr(0, maps.find('\n'));
     maps.remove_prefix(std::min(line.size() + 1, maps.size()));
     Part part{.begin = 0, .end = 0, .write = false};
-    const char* const last = line.data() + line.size();
-    const auto begin = std::from_chars(line.data(), last, part.begin, kHexadecimal);
+    const char* const last = line.end();
+    const auto begin = std::from_chars(line.begin(), last, part.begin, kHexadecimal);
     if (begin.ptr == last || *begin.ptr != '-') continue;
     const auto end = std::from_chars(begin.ptr + 1, last, part.end, kHexadecimal);
     const std::string_view rights(end.ptr, static_cast<std::size_t>(last - end.ptr));

@@ -48,8 +48,8 @@ class Variables : public ::testing::Test {
 };
 
 TEST_F(Variables, OfEachTypeAreRead) {
-  EXPECT_EQ(client_->table().symbols().size(), 25);
-  EXPECT_EQ(process_->runtime().variables, 25);
+  EXPECT_EQ(client_->table().symbols().size(), 23);
+  EXPECT_EQ(process_->runtime().variables, 23);
   EXPECT_EQ(process_->runtime().forces, 0);
   const ValueReply reply =
       client_->ask(client_->elements({"main.FLAG", "Main.real", "Main.lreal", "Main.pause", "Main.text",
@@ -99,7 +99,9 @@ TEST_F(Variables, AForceHoldsAtBothEdgesOfEachCycle) {
   for (int i = 0; i < 200; ++i) {
     const ValueReply reply = client_->ask(all);
     EXPECT_THAT(reply.forced, ElementsAre(1, 0, 0));
-    if (reply.consistent) EXPECT_THAT(client_->texts(reply), ElementsAre("5", "5", "5"));
+    if (reply.consistent) {
+      EXPECT_THAT(client_->texts(reply), ElementsAre("5", "5", "5"));
+    }
   }
   const ValueReply forced = client_->ask({}, ValueKind::forced);
   EXPECT_EQ(forced.elements, client_->elements({"Main.forced"}));
@@ -183,7 +185,9 @@ TEST_F(Variables, ThereIsABoundOfConnections) {
     // The answer of one that is too many comes unasked.
     const auto answer = receive_until(others.back(), MonotonicClock::now() + std::chrono::milliseconds(500));
     told = answer.has_value();
-    if (told) EXPECT_EQ(ValueReplyReader().take(*answer).value()->code, ErrorCode::busy);
+    if (told) {
+      EXPECT_EQ(ValueReplyReader().take(*answer).value()->code, ErrorCode::busy);
+    }
   }
   EXPECT_TRUE(told);
   EXPECT_EQ(others.size(), 8);  // with the client

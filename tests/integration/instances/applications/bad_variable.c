@@ -23,7 +23,7 @@ int plc_app_init(void) {
   variable.pAddress = (void*)16;
 #endif
 #ifdef BAD_CONSTANT
-  variable.pAddress = (void*)&expected;
+  variable.pAddress = (void*)(unsigned long)&expected;
 #endif
 #ifdef BAD_TASK
   variable.pszTask = "Mian";
