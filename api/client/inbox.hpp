@@ -15,7 +15,7 @@
 
 namespace plchost {
 
-/// The number of what was asked, who asked it, and whom.
+/// Request number, client and host.
 struct AnswerKey {
   dds::Guid asker;
   std::int64_t number = 0;

@@ -40,8 +40,8 @@ class NodeDirectory {
   static void remove(std::string_view pool, std::string_view base = kDefaultBlockBase) noexcept;
 
   /// Takes an address for this process: the forced one, or the one that the name had before, or a free one
-  /// from the upper half of the numbers first. already_exists: the address or the name is taken; says by
-  /// whom. full: all addresses are taken.
+  /// from the upper half of the numbers first. already_exists: the address or the name is taken; the
+  /// text names the process that has it. full: all addresses are taken.
   [[nodiscard]] Result<NodeLife> join(const NodeEntry& entry);
   /// Gives the address back.
   void leave(const NodeLife& life);

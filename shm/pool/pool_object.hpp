@@ -74,7 +74,7 @@ class PoolObject {
   }
   [[nodiscard]] ObjectStatus why_not_valid() const noexcept;
   [[nodiscard]] ObjectEntry& entry() const noexcept { return *entry_; }
-  /// Somebody who waits can be marked in it, so that a poster wakes it.
+  /// A waiter can be marked in it, so that a poster wakes it.
   [[nodiscard]] bool can_be_marked() const noexcept { return reference_ != nullptr; }
 
  private:
