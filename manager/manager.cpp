@@ -45,7 +45,7 @@ static_assert(kMinPoolObjects == kMinObjects && kMaxPoolObjects == kMaxObjects,
 Result<void> make_run_directory(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error) return failure(ErrorCode::system, "make the run directory " + path, error.value());
+  if (error) return failure(ErrorCode::system, "cannot create the run directory " + path, error.value());
   // Locks, sockets and records in it are believed.
   if (auto ours = check_own_folder(path); !ours) return failure_in("[host] run_directory", ours.error());
   return {};

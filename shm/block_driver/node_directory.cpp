@@ -256,7 +256,7 @@ Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
                                entry.queue_slots, kMinRingSlots, kMaxRingSlots));
   }
   const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
-  if (!lock) return failure_in("join the directory of nodes", lock.error());
+  if (!lock) return failure_in("cannot join the directory of nodes", lock.error());
   reclaim_locked();
   PLCHOST_TRY_ASSIGN(const auto node, choose(entry));
   NodeSlot& place = slot(node);

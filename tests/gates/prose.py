@@ -10,6 +10,7 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
 * No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Of a sentence with one colon
   neither half has more, and both together have at most 36. Behind a colon, the parts that ";" or ":" divides are counted one by
   one, and all together have at most 45. A list of more is written as a list.
+* The text of an error of the programs does not begin with an imperative: "cannot open FILE", not "open FILE".
 * No text has a word that manager/glossary.md forbids (the column "not"), nor its plural, nor its forms with -ed and -ing.
 
 A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md). So are comments, docstrings and
@@ -45,6 +46,13 @@ END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*(?:[A-Z0-9`\u
 PART = re.compile(r"(?<=[:;])\s+|\s+[-\u2013]\s+")
 WORD = re.compile(r"[\w'\u0001][\w'/.,\u0001-]*")
 CODE = "\u0001"  # one word of code
+# A call that makes an error. The step is its first literal.
+ERROR_CALL = re.compile(r"\b(?:failure|failure_in|openssl_failure|check_(?:errno|returned|entity|code))\(")
+CALL_PART = re.compile(r'"(?:\\.|[^"\\\n])*"|[()]')
+IMPERATIVE = re.compile(
+    r'"(accept|add|allocate|attach|bind|catch|change|choose|claim|connect|copy|create|empty|examine|filter|give|guard|join|listen|lock|look'
+    r'|make|map|open|pass|poll|post|prepare|publish|raise|reach|read|receive|remove|rename|send|set|sign|signal|start|sync|tie|wait|watch'
+    r'|write)[ "]')
 
 C_TOKEN = re.compile(
     r"""//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/|R"(?P<mark>\w*)\((?P<raw>.*?)\)(?P=mark)"|"""
@@ -255,6 +263,18 @@ def texts_of(name, source):
     return hash_texts(source)
 
 
+def imperatives(source):
+    """(line, literal) of each error whose text begins with an imperative."""
+    for call in ERROR_CALL.finditer(source):
+        depth = 1
+        for part in CALL_PART.finditer(source, call.end()):
+            depth += (part.group() == "(") - (part.group() == ")")
+            if not depth or part.group()[0] == '"':
+                if IMPERATIVE.match(part.group()):
+                    yield source.count("\n", 0, part.start()) + 1, part.group()
+                break
+
+
 def plain(text):
     """Code as one word, links as their text, nothing of emphasis."""
     text = re.sub(r"`+[^`]*`+", CODE, text)
@@ -318,7 +338,11 @@ def main():
     for name in names:
         if not name.endswith((".md", ".py", ".svg", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
             continue
-        for kind, text in texts_of(name, (options.root / name).read_text(encoding="utf-8")):
+        source = (options.root / name).read_text(encoding="utf-8")
+        for line, literal in imperatives(source) if name.endswith(C_FILES) and not name.startswith(("tests/", "instances/adapters/")) else ():
+            print(f"{name}:{line}: an error begins with an imperative: {literal}")
+            wrong += 1
+        for kind, text in texts_of(name, source):
             joined = text.joined()
             read += 1
             if kind == "message" and not is_message(joined):

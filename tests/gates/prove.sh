@@ -224,6 +224,11 @@ plant_in_prose "prose: comment in Python" "tests/planted.py:1: begins with 'what
 plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Whoever': Whoever asks" tests/planted.sh "true
 # W""hoever asks is answered."
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
+plant_in_prose "prose: imperative in an error" "shm/base/planted.cpp:1: an error begins with an imperative: \"open \"" shm/base/planted.cpp \
+  'return check_errno(::open(path.c_str(), O_RDONLY), "open " + path);'
+plant_in_prose "prose: imperative in the format of an error" "shm/base/planted.cpp:2: an error begins with an imperative: \"make topic {}\"" shm/base/planted.cpp \
+  'return failure(code(error),
+      fmt::format("make topic {}", name));'
 plant_in_prose "prose: message of a script" "tests/planted.sh:1: begins with 'who': who asks" tests/planted.sh 'fa''il "who asks is refused"'
 plant_in_prose "prose: string of CMake" "api/CMakeLists.txt:2: 'DDS server' is not a word of manager/glossary.md" api/CMakeLists.txt 'project(planted)
 plchost_manual(planted "the DDS server of a host")'
