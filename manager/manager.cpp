@@ -136,7 +136,7 @@ Result<void> Manager::set_up() {
   if (auto alone = lock_wishes(); !alone) return alone;
   // Children inherit this: instances then bind themselves to their own cores.
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
-    spdlog::warn("the manager stays where it is: {}", bound.error().describe());
+    spdlog::warn("cannot bind the manager to housekeeping_cores: {}", bound.error().describe());
   }
   PLCHOST_TRY_ASSIGN(const auto rights, pool_rights(host));
   clear_names(host.pool, rights);

@@ -179,13 +179,11 @@ void ControlServer::Parts::tell_of_refused(TimePoint now) {
   const std::uint64_t datagrams = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
   if (const auto more = refused_datagrams.take(datagrams, now)) {
     spdlog::warn(
-        "{} datagrams were refused, whole or in part, before DDS has read them: no RTPS, or not as it must "
-        "be",
+        "{} datagrams were rejected before DDS read them, whole or in part: they are no RTPS, or malformed",
         more);
   }
   if (const auto more = malformed_posts.take(intake->malformed(), now)) {
-    spdlog::warn("{} posts were refused: of another source than their writer, or numbered as none can be",
-                 more);
+    spdlog::warn("{} posts rejected: source differs from the writer, or invalid sequence number", more);
   }
 }
 

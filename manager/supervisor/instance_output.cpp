@@ -124,8 +124,8 @@ void InstanceOutput::forward(std::string_view bytes) {
   }
   not_forwarded_ += bytes.size();
   if (not_forwarded_ == 0 || !bytes.empty()) return;
-  spdlog::warn("instance {}: {} bytes that it said are not here; see plcctl logs", settings_.instance,
-               std::exchange(not_forwarded_, 0));
+  spdlog::warn("instance {0}: {1} bytes of output were dropped from this log; 'plcctl logs {0}' has them",
+               settings_.instance, std::exchange(not_forwarded_, 0));
 }
 
 }  // namespace plchost

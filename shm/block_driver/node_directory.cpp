@@ -36,7 +36,7 @@ Result<MemoryFile> open_or_make_directory(const std::string& name) {
     return replace ? MemoryFile::replace(name, sizeof(DirectoryLayout), fill_directory)
                    : MemoryFile::create(name, sizeof(DirectoryLayout), fill_directory);
   };
-  // Not a file of those who run nodes here, or no file at all, gives way. A header is mended below.
+  // Foreign files and non-files of this name are replaced. A header is mended below.
   return open_or_make(open, make, Replaces::foreign);
 }
 
