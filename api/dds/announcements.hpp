@@ -20,7 +20,7 @@ class Announcements {
   /// Right after the participant was made: its addresses are the configured ones now.
   explicit Announcements(dds_entity_t participant);
 
-  /// To be called again and again. `remote`: the participants that are there. Forgets the addresses that
+  /// To be called periodically. `remote`: the participants that are there. Forgets the addresses that
   /// belonged to none of them at this call and at the last one, because the address of a new participant is
   /// known before the participant. Returns the number of forgotten addresses.
   ///

@@ -40,7 +40,7 @@ enum class EndCause : std::uint8_t {
   start_transient,    ///< the host was short of something, or a lock was held
   declaration_taken,  ///< another process has an output or a node address that the start needs
   name_taken,         ///< a process of that name is there already
-  // The process is there, but its application does not run, or nobody can tell.
+  // The process is there, but its application does not run, or its state is not known.
   exception,            ///< a fault has stopped the application
   silent,               ///< the control thread does not answer
   adoption_unanswered,  ///< an adopted process does not answer

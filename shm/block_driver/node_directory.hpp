@@ -48,10 +48,11 @@ class NodeDirectory {
   /// Writes the record of a node of this process again if it is not what it should be, and what the directory
   /// says of itself.
   void keep(const NodeLife& life, const NodeEntry& entry);
-  /// Takes the addresses from nodes whose processes have ended, and removes their links. How many it were.
+  /// Takes the addresses from nodes whose processes have ended, and removes their links. Returns the number
+  /// of these nodes.
   std::uint32_t reclaim();
 
-  /// Nothing: nobody has the address, or the record is not valid. Any context.
+  /// Nothing: the address is free, or the record is not valid. Any context.
   [[nodiscard]] std::optional<NodeRecord> record(std::uint16_t node) const noexcept;
   /// Any context: looks at all of them.
   [[nodiscard]] std::optional<std::uint16_t> find(std::string_view name) const noexcept;

@@ -19,7 +19,7 @@ namespace plchost {
 /// Where the pool's table and the files of its memories disagree. Firmware that knows only a C header
 /// (shm/plc_process_image.h, shm/plc_reference_clock.h) makes a file without an entry: it becomes a kept
 /// object, with the rights of the file. Somebody removes a file: its entry goes. A file of another user
-/// cannot be removed from the sticky folder: its entry stays, unseen, until somebody can, or it is used
+/// cannot be removed from the sticky folder: its entry stays, unseen, until a process can, or it is used
 /// again.
 ///
 /// Only a file that says what it is, and whose owner may write the pool, is taken. Set-up.

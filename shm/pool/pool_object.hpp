@@ -109,8 +109,8 @@ class SharedEvent : public PoolObject {
   [[nodiscard]] PoolEvent event() const noexcept;
 };
 
-/// See CountingSemaphore: a number that any user may raise and lower; units that a dead user took stay taken.
-/// For exclusive use take a mutex.
+/// See CountingSemaphore: a number that any user may raise and lower; units that an ended user took stay
+/// taken. For exclusive use take a mutex.
 class SharedSemaphore : public PoolObject {
  public:
   static constexpr ObjectType kType = ObjectType::semaphore;
