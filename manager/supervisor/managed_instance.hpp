@@ -380,7 +380,7 @@ inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
 inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
 /// 8 s for the set-up of the new version, 6 s for a moment in which no task is in a cycle.
 inline constexpr Duration kChangeLimit = std::chrono::seconds(18);
-/// The process's page is believed only this long after its own answer: it is written each 100 ms.
+/// The process's page is believed only this long after its own answer: it is written periodically.
 inline constexpr Duration kPageLag = std::chrono::seconds(1);
 
 }  // namespace plchost
