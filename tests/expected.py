@@ -2,6 +2,9 @@
 
 import fnmatch
 
+# Each kind of line is held against one kind of build, which has all tests that such lines name.
+HELD_BY = {"any": "plain", "plain": "plain", "sanitized": "address", "address": "address", "thread": "thread"}
+
 
 class Expected:
     """Each line: KIND PATTERN REASON. KIND: any, plain, sanitized, address or thread. PATTERN: a name with * and ?."""
@@ -9,15 +12,18 @@ class Expected:
     def __init__(self, path, kind="any"):
         kinds = {"any", kind} | ({"sanitized"} if kind in ("address", "thread") else set())
         self.entries = []
+        self.held = []  # by this kind of build: where the line stands, and its pattern
         if not path:
             return
         with open(path, encoding="utf-8") as file:
             for number, line in enumerate(file, 1):
                 words = line.split("#")[0].split(maxsplit=2)
-                if words and len(words) < 3:
-                    raise SystemExit(f"{path}:{number}: a line is KIND PATTERN REASON")
+                if words and (len(words) < 3 or words[0] not in HELD_BY):
+                    raise SystemExit(f"{path}:{number}: a line is KIND PATTERN REASON, with one of the kinds {', '.join(HELD_BY)}")
                 if words and words[0] in kinds:
                     self.entries.append((words[1], words[2].strip()))
+                    if HELD_BY[words[0]] == kind:
+                        self.held.append((f"{path}:{number}", words[1]))
 
     def reason(self, name, *labels):
         """Why it is expected of the test of this name; None: it is not. With labels: only lines whose reason begins with one."""
@@ -25,3 +31,7 @@ class Expected:
             if fnmatch.fnmatchcase(name, pattern) and (not labels or reason.startswith(labels)):
                 return reason
         return None
+
+    def of_no_test(self, names):
+        """The lines that this kind of build holds, and that match none of these tests: place and pattern."""
+        return [line for line in self.held if not fnmatch.filter(names, line[1])]

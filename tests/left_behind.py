@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The left-overs of a run of the tests: processes, files, shared memories, networks and mounts.
+"""The left-overs of a run of the tests: processes, files, shared memories, networks, mounts, and files among the sources.
 
 Usage: left_behind.py begin FILE   notes what is there already
        left_behind.py end FILE     prints what has come since; exit code 1 if that is anything
@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import re
+import subprocess
 import sys
 
 SHARED_MEMORY = pathlib.Path("/dev/shm")
@@ -68,6 +69,15 @@ def of_others(marker):
     return held, numbers
 
 
+def untracked():
+    """Files of the working folder's checkout that git neither has nor ignores; none if it is no checkout."""
+    try:
+        said = subprocess.run(["git", "ls-files", "-z", "--others", "--exclude-standard", "--", "."], check=True, capture_output=True, text=True)
+    except (OSError, subprocess.CalledProcessError):
+        return []
+    return sorted(said.stdout.split("\0")[:-1])
+
+
 def noted():
     there = {str(folder): sorted(name for name in names_in(folder) if "plc" in name) for folder in FOLDERS}
     there[str(SHARED_MEMORY)] = sorted(names_in(SHARED_MEMORY))
@@ -81,6 +91,7 @@ def left(before, marker, folder):
     for line in read(pathlib.Path("/proc/self/mounts")).decode(errors="replace").splitlines():
         if folder in line:
             yield f"mount {line}"
+    yield from (f"in the sources: {name}" for name in untracked() if name not in before["sources"])
     held, numbers = of_others(marker)
     for place, now in noted().items():
         for name in now:
@@ -95,7 +106,7 @@ def main():
         raise SystemExit(__doc__)
     file = pathlib.Path(sys.argv[2])
     if sys.argv[1] == "begin":
-        file.write_text(json.dumps(noted()), encoding="utf-8")
+        file.write_text(json.dumps({**noted(), "sources": untracked()}), encoding="utf-8")
         return 0
     found = list(left(json.loads(file.read_text(encoding="utf-8")), os.environ["PLCHOST_RUN"], os.environ["TMPDIR"]))
     for what in found:

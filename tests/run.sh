@@ -22,6 +22,7 @@ case "${1:-}" in
     ;;
 esac
 build=.build/tests
+export PYTHONDONTWRITEBYTECODE=1  # the tree of the sources stays as it was
 export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
 step=0
@@ -210,7 +211,7 @@ case "${1:-}" in
     join build_asan "address and undefined sanitizers: build"
     run "address and undefined sanitizers: tests" tests .build/asan "${whole[@]}"
     count
-    # Of the integration tests only those of the API: instances and the manager share memory of several processes.
+    # Of the integration tests only those of the API (tests/README.md).
     join build_tsan "thread sanitizer: build"
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count

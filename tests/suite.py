@@ -5,8 +5,8 @@ Usage: suite.py [--jobs N] BUILD [CTEST_OPTION...]
 
 A test that fails runs again only if tests/retries.txt names it. A test that is skipped although tests/skips.txt does not
 name it fails the run, and so does one that needed a further round without being listed. So does a case of a test program
-that ctest does not have exactly once. Shares of whole programs (cases.py) count with each of their cases. The last lines
-name the tests that took most processor time.
+that ctest does not have exactly once, and so does a line of these two lists that matches no test. Shares of whole programs
+(cases.py) count with each of their cases. The last lines name the tests that took most processor time.
 """
 
 import argparse
@@ -116,6 +116,11 @@ class Suite:
                       if "DISABLED_" not in case and (cases.count(case) != 1 or case not in there)]
         return sorted(wrong)
 
+    def of_no_test(self, *lists):
+        """Lines that name no test of this build, be it chosen for this run or not."""
+        names = [name for name, _ in self.listed([])]
+        return [line for entries in lists for line in entries.of_no_test(names)]
+
     def print_costly(self):
         """Of all tests to a file, of the first to standard output."""
         lines = [f"{seconds:8.1f} s {name}\n" for name, seconds in
@@ -196,8 +201,11 @@ def main():
     wrongly_listed = suite.wrongly_listed()
     for name in wrongly_listed:
         print(f"FAILED: {name}: ctest has not exactly one test for it; remove *_tests.cmake in {options.build}")
+    of_no_test = suite.of_no_test(retries, skips)
+    for place, pattern in of_no_test:
+        print(f"FAILED: {place}: no test matches {pattern}: remove the line, or name the test as it is called")
     suite.print_costly()
-    failed = {*named["failed"], *unexpected, *unlisted, *wrongly_listed}
+    failed = {*named["failed"], *unexpected, *unlisted, *wrongly_listed, *of_no_test}
     passed = {name for name, result in results.items() if result in ("passed", "retried")} - failed
     print(f"{len(passed)} passed, {len(failed)} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")

@@ -42,6 +42,13 @@ struct Computed {};
 template <class Sample>
 inline constexpr bool kHasRow = false;
 
+/// The code of a word; 0, which says so, if it is none of them.
+[[nodiscard]] inline std::uint32_t code_for(std::span<const std::string_view> words, std::string_view word) {
+  for (std::uint32_t code = 1; code < words.size(); ++code)
+    if (words[code] == word) return code;
+  return 0;
+}
+
 /// The word for a code. A newer host may know more: its number is shown.
 [[nodiscard]] inline std::string word_for(std::span<const std::string_view> words, std::uint64_t code) {
   return code < words.size() ? std::string(words[code]) : std::to_string(code);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <topic_names.hpp>
 
 #include "api/dds/domain.hpp"
 #include "api/dds/error.hpp"
@@ -44,23 +45,23 @@ Qos answers_qos(const TopicInfo& topic, std::int32_t each) {
 }
 
 std::string name_partition(std::string_view host) {
-  return fmt::format("n.{}", host);
+  return fmt::format("{}{}", topic_names::kNamePartition, host);
 }
 
 std::string host_partition(std::string_view host) {
-  return fmt::format("h.{}", host);
+  return fmt::format("{}{}", topic_names::kHostPartition, host);
 }
 
 std::string status_partition(std::string_view host) {
-  return fmt::format("s.{}", host);
+  return fmt::format("{}{}", topic_names::kStatusPartition, host);
 }
 
 std::string client_partition(std::string_view guid_hex, std::string_view host) {
-  return fmt::format("c.{}/{}", guid_hex, host);
+  return fmt::format("{}{}/{}", topic_names::kClientPartition, guid_hex, host);
 }
 
 std::string block_partition(std::string_view to_host, std::string_view from_host) {
-  return fmt::format("b.{}/{}", to_host, from_host);
+  return fmt::format("{}{}/{}", topic_names::kBlocksPartition, to_host, from_host);
 }
 
 Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic) {

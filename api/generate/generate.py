@@ -146,6 +146,9 @@ def topic_names(contract):
     for letter, what in PARTITIONS.items():
         told = ", ".join(f'"{name}"' for name in of_partition[letter])
         lines.append(f"inline constexpr std::array<std::string_view, {len(of_partition[letter])}> k{what.capitalize()}{{{told}}};")
+    lines.append("\n// The beginning of the partition's name.")
+    for letter, what in PARTITIONS.items():
+        lines.append(f'inline constexpr std::string_view k{what.capitalize()}Partition = "{letter}.";')
     return "\n".join(lines + ["\n}  // namespace plchost::topic_names\n"])
 
 

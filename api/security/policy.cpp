@@ -15,6 +15,11 @@ namespace plchost::security {
 namespace {
 
 using Topics = std::vector<std::string_view>;
+using topic_names::kBlocksPartition;
+using topic_names::kClientPartition;
+using topic_names::kHostPartition;
+using topic_names::kNamePartition;
+using topic_names::kStatusPartition;
 
 /// Some topics in some partitions; no partition: the default one.
 struct Grant {
@@ -34,6 +39,10 @@ Topics topics_of(const std::array<std::string_view, N>& topics) {
   return Topics(topics.begin(), topics.end());
 }
 
+std::string in(std::string_view partition, std::string_view rest) {
+  return std::string(partition).append(rest);
+}
+
 // Those for a host, and more of these.
 Topics asking(const Topics& more) {
   Topics topics = topics_of(topic_names::kHost);
@@ -48,31 +57,32 @@ std::vector<Grant> may_write(const Subject& subject) {
     case Role::viewer:
       return {};
     case Role::operating:
-      return {{asking({"plc/v1/op/request"}), "h.*"}};
+      return {{asking({"plc/v1/op/request"}), in(kHostPartition, "*")}};
     case Role::engineer:
-      return {{asking({"plc/v1/op/request", "plc/v1/eng/*"}), "h.*"}};
+      return {{asking({"plc/v1/op/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
     case Role::admin:
-      return {{asking({"plc/v1/*/request", "plc/v1/eng/*"}), "h.*"}};
+      return {{asking({"plc/v1/*/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
     case Role::host:
-      return {{topics_of(topic_names::kStatus), "s." + name},
-              {topics_of(topic_names::kClient), "c.*/" + name},
-              {topics_of(topic_names::kBlocks), "b.*/" + name},
-              {topics_of(topic_names::kName), "n." + name}};
+      return {{topics_of(topic_names::kStatus), in(kStatusPartition, name)},
+              {topics_of(topic_names::kClient), in(kClientPartition, "*/" + name)},
+              {topics_of(topic_names::kBlocks), in(kBlocksPartition, "*/" + name)},
+              {topics_of(topic_names::kName), in(kNamePartition, name)}};
   }
   return {};
 }
 
 std::vector<Grant> may_read(const Subject& subject, const GuidPrefix& prefix) {
   const std::string& name = subject.name;
-  if (subject.role == Role::viewer) return {{topics_of(topic_names::kStatus), "s.*"}};
+  if (subject.role == Role::viewer) return {{topics_of(topic_names::kStatus), in(kStatusPartition, "*")}};
   if (subject.role == Role::host) {
-    return {{{"plc/v1/status/block_host"}, "s.*"},
-            {asking({"plc/v1/*/request", "plc/v1/eng/*"}), "h." + name},
-            {topics_of(topic_names::kBlocks), "b." + name + "/*"},
-            {topics_of(topic_names::kName), "n." + name}};
+    return {{{"plc/v1/status/block_host"}, in(kStatusPartition, "*")},
+            {asking({"plc/v1/*/request", "plc/v1/eng/*"}), in(kHostPartition, name)},
+            {topics_of(topic_names::kBlocks), in(kBlocksPartition, name + "/*")},
+            {topics_of(topic_names::kName), in(kNamePartition, name)}};
   }
-  return {{topics_of(topic_names::kStatus), "s.*"},
-          {topics_of(topic_names::kClient), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
+  return {
+      {topics_of(topic_names::kStatus), in(kStatusPartition, "*")},
+      {topics_of(topic_names::kClient), in(kClientPartition, fmt::format("{:02x}*", fmt::join(prefix, "")))}};
 }
 
 std::string criteria(std::string_view what, const std::vector<Grant>& grants) {

@@ -13,8 +13,10 @@ using Action = Decision::Action;
 struct DecisionRow {
   enum class Counts : std::uint8_t { nothing, end, crash, forget };
   EndCause cause;
-  Counts counts;  // in the history
-  Action never;   // by the restart policy
+  Counts counts;            // in the history
+  bool follows_autostart;   // "begun": the manager has just begun, or has read its configuration again
+  bool blames_application;  // "blame": ends in set-up, while an application that was loaded is new
+  Action never;             // by the restart policy
   Action on_failure;
   Action always;
   Action stopped;  // by an operator while it had no process, or begun by nobody
@@ -27,31 +29,31 @@ constexpr auto kDecisionRows = [] {
   using Counts = DecisionRow::Counts;
   // clang-format off
   return std::array<DecisionRow, kEndCauses>{{
-      // cause             counts           never           on_failure      always          stopped     removed
-      {exited,              Counts::crash,   fail,           back_off,       back_off,       go_offline, fail},
-      {killed,              Counts::crash,   fail,           back_off,       back_off,       go_offline, fail},
-      {unknown,             Counts::crash,   fail,           back_off,       back_off,       go_offline, fail},
-      {unwatched,           Counts::crash,   fail,           back_off,       back_off,       go_offline, fail},
-      {start_refused,       Counts::end,     fail,           fail,           back_off,       go_offline, fail},
-      {start_transient,     Counts::end,     fail,           back_off,       back_off,       go_offline, fail},
-      {declaration_taken,   Counts::end,     fail,           back_off,       back_off,       go_offline, fail},
-      {name_taken,          Counts::end,     back_off,       back_off,       back_off,       go_offline, fail},
-      {exception,           Counts::nothing, leave,          leave,          leave,          leave,      leave},
-      {silent,              Counts::nothing, leave,          leave,          leave,          leave,      leave},
-      {adoption_unanswered, Counts::nothing, leave,          leave,          leave,          leave,      leave},
-      {idle,                Counts::nothing, leave,          leave,          leave,          leave,      bring_down},
-      {operators_stop,      Counts::nothing, leave,          leave,          leave,          leave,      bring_down},
-      {stop_of_waiting,     Counts::nothing, go_offline,     go_offline,     go_offline,     go_offline, go_offline},
-      {replaced,            Counts::forget,  start_now,      start_now,      start_now,      start_now,  start_now},
-      {told_to_end,         Counts::nothing, go_offline,     go_offline,     go_offline,     go_offline, go_offline},
-      {manager_ends,        Counts::nothing, bring_down,     bring_down,     bring_down,     bring_down, bring_down},
-      {never_begun,         Counts::nothing, start_in_order, start_in_order, start_in_order, leave,      leave},
-      {without_process,     Counts::nothing, start_in_order, start_in_order, start_in_order, go_offline, go_offline},
-      {setting_up_unknown,  Counts::nothing, await_process,  start_in_order, start_in_order, go_offline, go_offline},
-      {host_ended,          Counts::nothing, fail,           start_in_order, start_in_order, go_offline, go_offline},
-      {given_up,            Counts::nothing, fail,           fail,           fail,           fail,       fail},
-      {wish_unreadable,     Counts::nothing, fail,           fail,           fail,           fail,       fail},
-      {reconfigured,        Counts::nothing, start_in_order, start_in_order, start_in_order, leave,      leave},
+      // cause             counts           begun  blame  never           on_failure      always          stopped     removed
+      {exited,              Counts::crash,   false, true,  fail,           back_off,       back_off,       go_offline, fail},
+      {killed,              Counts::crash,   false, true,  fail,           back_off,       back_off,       go_offline, fail},
+      {unknown,             Counts::crash,   false, true,  fail,           back_off,       back_off,       go_offline, fail},
+      {unwatched,           Counts::crash,   true,  false, fail,           back_off,       back_off,       go_offline, fail},
+      {start_refused,       Counts::end,     false, true,  fail,           fail,           back_off,       go_offline, fail},
+      {start_transient,     Counts::end,     false, false, fail,           back_off,       back_off,       go_offline, fail},
+      {declaration_taken,   Counts::end,     false, true,  fail,           back_off,       back_off,       go_offline, fail},
+      {name_taken,          Counts::end,     false, false, back_off,       back_off,       back_off,       go_offline, fail},
+      {exception,           Counts::nothing, false, false, leave,          leave,          leave,          leave,      leave},
+      {silent,              Counts::nothing, false, false, leave,          leave,          leave,          leave,      leave},
+      {adoption_unanswered, Counts::nothing, false, false, leave,          leave,          leave,          leave,      leave},
+      {idle,                Counts::nothing, false, false, leave,          leave,          leave,          leave,      bring_down},
+      {operators_stop,      Counts::nothing, false, false, leave,          leave,          leave,          leave,      bring_down},
+      {stop_of_waiting,     Counts::nothing, false, false, go_offline,     go_offline,     go_offline,     go_offline, go_offline},
+      {replaced,            Counts::forget,  false, false, start_now,      start_now,      start_now,      start_now,  start_now},
+      {told_to_end,         Counts::nothing, false, false, go_offline,     go_offline,     go_offline,     go_offline, go_offline},
+      {manager_ends,        Counts::nothing, false, false, bring_down,     bring_down,     bring_down,     bring_down, bring_down},
+      {never_begun,         Counts::nothing, true,  false, start_in_order, start_in_order, start_in_order, leave,      leave},
+      {without_process,     Counts::nothing, true,  false, start_in_order, start_in_order, start_in_order, go_offline, go_offline},
+      {setting_up_unknown,  Counts::nothing, true,  false, await_process,  start_in_order, start_in_order, go_offline, go_offline},
+      {host_ended,          Counts::nothing, true,  false, fail,           start_in_order, start_in_order, go_offline, go_offline},
+      {given_up,            Counts::nothing, true,  false, fail,           fail,           fail,           fail,       fail},
+      {wish_unreadable,     Counts::nothing, true,  false, fail,           fail,           fail,           fail,       fail},
+      {reconfigured,        Counts::nothing, true,  false, start_in_order, start_in_order, start_in_order, leave,      leave},
   }};
   // clang-format on
 }();
@@ -63,17 +65,6 @@ constexpr bool in_order_of_causes() {
   return true;
 }
 static_assert(in_order_of_causes(), "each cause has one row");
-
-// The manager has just begun, or has read its configuration again.
-constexpr bool follows_autostart(EndCause cause) {
-  return cause == EndCause::unwatched || cause >= EndCause::never_begun;
-}
-
-// These end in set-up, while an application that was loaded is new.
-constexpr bool blames_application(EndCause cause) {
-  return cause <= EndCause::declaration_taken && cause != EndCause::unwatched &&
-         cause != EndCause::start_transient;
-}
 
 Action by_policy(const DecisionRow& row, const InstanceConfig& policy) {
   switch (policy.restart) {
@@ -89,11 +80,11 @@ Action by_policy(const DecisionRow& row, const InstanceConfig& policy) {
 }
 
 Action action_of(const DecisionRow& row, const End& end, const InstanceConfig& policy) {
-  if (end.has_earlier && blames_application(row.cause)) return Action::start_earlier;
+  if (end.has_earlier && row.blames_application) return Action::start_earlier;
   if (end.order == Order::no_process) return row.stopped;
   if (end.removed) return row.removed;
   const bool may_begin = end.order != Order::none || policy.autostart;
-  return may_begin || !follows_autostart(row.cause) ? by_policy(row, policy) : row.stopped;
+  return may_begin || !row.follows_autostart ? by_policy(row, policy) : row.stopped;
 }
 
 void forget_old(RestartHistory& history, TimePoint now, const InstanceConfig& policy) {

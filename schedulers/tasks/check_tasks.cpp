@@ -37,7 +37,9 @@ Result<void> check_plan(const TaskConfig& task) {
 Result<void> check_watchdog(const TaskConfig& task) {
   const TaskWatchdog& watchdog = task.watchdog;
   if (watchdog.time < Duration::zero() || watchdog.time > kMaxWatchdogTime) {
-    return bad_task(task, "its watchdog time must be 0 (off) to 4294967295 us");
+    return bad_task(task,
+                    fmt::format("its watchdog time must be 0 (off) to {} us",
+                                std::chrono::floor<std::chrono::microseconds>(kMaxWatchdogTime).count()));
   }
   if (watchdog.sensitivity < 1 || watchdog.sensitivity > kMaxWatchdogCount) {
     return bad_task(task, fmt::format("its watchdog sensitivity must be 1 to {}", kMaxWatchdogCount));

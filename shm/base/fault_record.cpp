@@ -73,19 +73,19 @@ std::string_view to_string(FaultKind kind) noexcept {
     case FaultKind::signal:
       return "signal";
     case FaultKind::cpp_exception:
-      return "C++ exception";
+      return "cpp_exception";
     case FaultKind::task_watchdog:
-      return "task watchdog";
+      return "task_watchdog";
     case FaultKind::consecutive_overruns:
-      return "consecutive overruns";
+      return "consecutive_overruns";
     case FaultKind::omitted_cycles:
-      return "omitted cycles";
+      return "omitted_cycles";
     case FaultKind::processor_load:
-      return "processor load";
+      return "processor_load";
     case FaultKind::stop_timeout:
-      return "stop timeout";
+      return "stop_timeout";
     case FaultKind::no_processor:
-      return "no processor";
+      return "no_processor";
   }
   return "unknown";
 }

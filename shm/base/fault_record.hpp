@@ -19,6 +19,7 @@ enum class FaultKind : std::uint8_t {
   stop_timeout,          ///< the cycle did not end in the time that a stop allows
   no_processor,          ///< a thread that the application has made kept the processor from the task
 };
+/// The words of the contract: ExceptionStatus.kind.
 [[nodiscard]] std::string_view to_string(FaultKind kind) noexcept;
 
 /// The phase that was over when a task had not come to the end of its cycle.

@@ -12,7 +12,6 @@
 #include "shm/base/duration_histogram.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/time.hpp"
-#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 
@@ -73,10 +72,6 @@ struct TaskCounters {
 /// The largest deviation of a period, in either direction.
 [[nodiscard]] constexpr std::int64_t largest_jitter_ns(const TaskCounters& counters) noexcept {
   return std::max(counters.jitter_max_ns, -std::max(counters.jitter_min_ns, -INT64_MAX));
-}
-/// How far the latencies lie apart.
-[[nodiscard]] constexpr std::int64_t release_jitter_ns(const TaskCounters& counters) noexcept {
-  return wrapping_difference(counters.latency_max_ns, counters.latency_min_ns);
 }
 
 /// The histograms of a task: where the buckets of each lie in its memory.

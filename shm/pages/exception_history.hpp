@@ -17,7 +17,7 @@ struct ExceptionEntry {
   std::int64_t unix_ns = 0;  ///< CLOCK_REALTIME
   std::string application;   ///< path of the file
   std::string task;
-  std::string kind;                  ///< "signal", "C++ exception", "task watchdog" ...
+  std::string kind;                  ///< "signal", "cpp_exception", "task_watchdog" ...
   bool whole_application = true;     ///< false: only the task was stopped
   std::string signal;                ///< "SIGSEGV"; empty: none
   std::uint64_t address = 0;         ///< of the instruction; 0: not known

@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -82,20 +81,6 @@ Result<std::optional<std::string>> PacketSocket::receive() {
     return failure(ErrorCode::corrupt, fmt::format("packet larger than {} bytes", kMaxPacket));
   }
   return std::string(buffer.data(), static_cast<std::size_t>(length));
-}
-
-Result<std::string> PacketSocket::receive_until(TimePoint deadline) {
-  for (;;) {
-    PLCHOST_TRY_ASSIGN(auto packet, receive());
-    if (packet) return std::move(*packet);
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - MonotonicClock::now());
-    if (left.count() <= 0) return failure(ErrorCode::timed_out, "no answer on the control socket");
-    pollfd poll{.fd = fd_.get(), .events = POLLIN, .revents = 0};
-    const auto wait = std::min<std::chrono::milliseconds::rep>(left.count(), 60'000);
-    if (::poll(&poll, 1, static_cast<int>(wait)) < 0 && errno != EINTR) {
-      return failure(ErrorCode::system, "cannot wait at the control socket", errno);
-    }
-  }
 }
 
 Result<int> PacketSocket::peer_pid() const {

@@ -34,8 +34,6 @@ class PacketSocket {
   [[nodiscard]] Result<void> send(std::string_view packet);
   /// Nothing: no packet is there now. unavailable: the peer is gone. corrupt: larger than kMaxPacket.
   [[nodiscard]] Result<std::optional<std::string>> receive();
-  /// Waits for a packet until the deadline. timed_out: none came.
-  [[nodiscard]] Result<std::string> receive_until(TimePoint deadline);
   /// The process at the other end, as the kernel says.
   [[nodiscard]] Result<int> peer_pid() const;
   void close() noexcept { fd_.reset(); }

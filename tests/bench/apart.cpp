@@ -113,7 +113,7 @@ void write_row(std::ostream& to, const Row& row) {
     write_text(to, target.unit);
     write_double(to, target.measured);
     write_double(to, target.bound);
-    to << target.or_equal << ' ';
+    to << target.or_equal << ' ' << target.only_steady << ' ';
   }
 }
 
@@ -133,7 +133,7 @@ Row read_row(std::istream& from) {
     target.unit = read_text(from);
     target.measured = read_double(from);
     target.bound = read_double(from);
-    from >> target.or_equal;
+    from >> target.or_equal >> target.only_steady;
   }
   return row;
 }

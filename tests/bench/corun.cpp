@@ -75,8 +75,8 @@ double with_deviation(double count) {
 
 Row to_row(std::string_view scheduler, const Figures& figures) {
   const Stalls& stalls = figures.stalls;
-  const double p999 = summarise(figures.ours).p999;
-  const double bare_p999 = summarise(figures.floor).p999;
+  const double p999 = decisive_p999(figures.ours);
+  const double bare_p999 = decisive_p999(figures.floor);
   return {
       .name = "corun/" + std::string(scheduler) + "/1ms",
       .sample = "a cycle",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -169,6 +170,19 @@ std::string details(const Row& row) {
   return text;
 }
 
+/// The bound is one figure, the same in each round.
+bool steady(const std::vector<Round>& rounds, std::size_t index) {
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const Round& round : rounds) {
+    const Target& target = round.targets[index];
+    if (!target.decided()) continue;
+    least = std::min(least, target.measured);
+    most = std::max(most, target.measured);
+  }
+  return most - least <= rounds.front().targets[index].bound;  // also if there is none
+}
+
 void add_figures(Row& row, Row round) {
   row.rounds.push_back({summarise(round.ours), summarise(round.floor), round.extra, round.targets});
   row.ours.append(round.ours);
@@ -215,7 +229,9 @@ void add_round(std::vector<Row>& all, std::vector<Row> round) {
 
 Verdict verdict_of(const Row& row, std::size_t index) {
   Verdict verdict;
-  for (const Round& round : rounds_of(row)) {
+  const std::vector<Round> rounds = rounds_of(row);
+  if (rounds.front().targets[index].only_steady && !steady(rounds, index)) return verdict;
+  for (const Round& round : rounds) {
     if (round.targets[index].decided()) ++verdict.decided;
     if (round.targets[index].met()) ++verdict.met;
   }

@@ -18,6 +18,8 @@ struct Target {
   double measured = 0;
   double bound = 0;
   bool or_equal = false;
+  /// Decided only if the rounds' figures lie no further apart than the bound: else the machine is measured.
+  bool only_steady = false;
   /// False if one of them is kNotMeasured.
   [[nodiscard]] bool decided() const noexcept { return !std::isnan(measured) && !std::isnan(bound); }
   [[nodiscard]] bool met() const noexcept {

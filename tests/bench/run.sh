@@ -11,6 +11,7 @@ set -euo pipefail
 here=$PWD
 cd "$(dirname "$0")/../.."
 build=.build/bench
+export PYTHONDONTWRITEBYTECODE=1  # the tree of the sources stays as it was
 case " $* " in
   *" -h "* | *" --help "*)
     sed -n '2,/^[^#]/s/^# \{0,1\}//p' tests/bench/run.sh

@@ -18,4 +18,9 @@ Summary summarise(const Samples& samples) {
   return {.p50 = at(0.5), .p90 = at(0.9), .p99 = at(0.99), .p999 = at(0.999), .max = to_us(greatest)};
 }
 
+double decisive_p999(const Samples& samples) {
+  constexpr std::size_t kLeast = 19'500;
+  return samples.size() >= kLeast ? summarise(samples).p999 : kNotMeasured;
+}
+
 }  // namespace plchost::bench

@@ -60,6 +60,10 @@ struct Summary {
 
 [[nodiscard]] Summary summarise(const Samples& samples);
 
+/// Few samples lie above p99.9, and the figure of few is that of chance: for a verdict 20 must, rounded, or
+/// it is kNotMeasured.
+[[nodiscard]] double decisive_p999(const Samples& samples);
+
 [[nodiscard]] constexpr double to_us(Duration value) noexcept {
   return static_cast<double>(value.count()) / 1e3;
 }

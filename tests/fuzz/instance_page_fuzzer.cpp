@@ -34,7 +34,6 @@ void use(const InstancePageReader& page) {
     (void)task->identity.name.view();
     (void)average(counters.exec_sum_ns, counters.recorded);
     (void)largest_jitter_ns(counters);
-    (void)release_jitter_ns(counters);
     for (const auto which : {TaskHistogram::latency, TaskHistogram::jitter_positive}) {
       const HistogramDigest digest(page.histogram(i, which), Duration(counters.latency_min_ns),
                                    Duration(counters.latency_max_ns));

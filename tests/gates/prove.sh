@@ -118,6 +118,12 @@ new_tree
 mkdir -p "$plot/tree/instances/runtime/"{abi,tasks} && printf '{\n  plc_call;\n};\n' >"$plot/tree/instances/runtime/exported_symbols.txt"
 echo 'void* plc_call(int x) {}' | tee "$plot/tree/instances/runtime/abi/calls.cpp" >"$plot/tree/instances/runtime/tasks/table.cpp" && commit_tree
 must_be_red "house: function of plc_app.h" "instances/runtime/tasks/table.cpp:1:void* plc_call(int x) {}" "$gates/house.sh" "$plot/tree"
+new_tree
+mkdir -p "$plot/tree/instances/runtime/abi" && touch "$plot/tree/instances/runtime/"{exported_symbols.txt,abi/calls.cpp} && commit_tree
+must_be_red "house: empty exported_symbols.txt" "exported_symbols.txt: it does not list the functions of plc_app.h" "$gates/house.sh" "$plot/tree"
+new_tree
+echo 'void* library = dlop''en(path, RTLD_NOW);' >"$plot/tree/api/library.cpp" && commit_tree
+must_be_red "house: library without a cause" "the lines above do not tell a shortage from a wrong file: use open_library" "$gates/house.sh" "$plot/tree"
 
 new_tree
 printf '// clang-format off\n// A table. clang-''format on\n' >"$plot/tree/shm/base/joined.hpp" && commit_tree
@@ -130,6 +136,9 @@ new_tree
 mkdir "$plot/tree/schedulers/policies" && echo '    PolicyName<class Second>{"Second"},' >"$plot/tree/schedulers/policies/registry.hpp"
 echo 'auto* name = "Second";' | tee "$plot/tree/schedulers/policies/second.cpp" >"$plot/tree/api/words.cpp" && commit_tree
 must_be_red "house: name of a scheduler" "api/words.cpp:1:auto* name" "$gates/house.sh" "$plot/tree"
+new_tree
+mkdir "$plot/tree/schedulers/policies" && touch "$plot/tree/schedulers/policies/registry.hpp" && commit_tree
+must_be_red "house: empty registry" "schedulers/policies/registry.hpp: it does not list the schedulers" "$gates/house.sh" "$plot/tree"
 new_tree
 echo 'bool late = kind == Task''Kind::cyclic;' >"$plot/tree/instances/late.cpp" && commit_tree
 must_be_red "house: kind of a task" "the lines above know a kind of task" "$gates/house.sh" "$plot/tree"
@@ -157,6 +166,7 @@ plant_in_contract() {
   must_be_red "$1" "$2" "$gates/contract.sh" "$plot/tree"
 }
 plant_in_contract "contract: old reference" "reference.md is not up to date" 's,// of plchost-dds,// of the server,'
+plant_in_contract "contract: old copy" "control_v1.idl is not up to date: copy api/control.idl" 's,// of plchost-dds,// of the server,' --write
 plant_in_contract "contract: no comment" "Presence.pid has no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
 plant_in_contract "contract: no QoS" "LogPage has no 'qos:'" '/qos: as ObjectPage/d'
 plant_in_contract "contract: QoS that the generator does not know" "this QoS is not understood: RELIABLE 1 ms" 's/qos: RELIABLE \(1 ms\), KEEP_LAST 16/qos: RELIABLE 1 ms, KEEP_LAST 16/'
@@ -354,6 +364,17 @@ rm "$TMPDIR/planted"
 touch /dev/shm/plchost-planted
 must_be_red "left behind: a shared memory" "in /dev/shm: plchost-planted" left_behind
 rm /dev/shm/plchost-planted
+new_tree
+commit_tree
+touch "$plot/tree/tests/planted.pyc"
+left_in_sources() { (cd "$plot/tree" && "$gates/../left_behind.py" end "$plot/before"); }
+must_be_red "left behind: a file among the sources" "in the sources: tests/planted.pyc" left_in_sources
+rm "$plot/tree/tests/planted.pyc"
+# In a namespace of its own, whose mounts go with it. A user who may not mount cannot leave any behind.
+mount_and_look() { unshare --mount "$BASH" -c 'mount -t tmpfs planted "$TMPDIR" && tests/left_behind.py end "$1"' _ "$plot/before"; }
+if unshare --mount "$BASH" -c 'mount -t tmpfs planted "$TMPDIR"' 2>/dev/null; then
+  must_be_red "left behind: a mount" "mount planted $TMPDIR tmpfs" mount_and_look
+fi
 
 # The lists of tests that may be skipped or run again: tests on none of them are reported.
 echo 'thread Planted.* planted' >"$plot/list"
@@ -362,4 +383,34 @@ must_be_red "expected tests" "planted" reason thread Planted.Case
 for other in "plain Planted.Case" "address Planted.Case" "thread Other.Case"; do
   reason $other || { echo "the list of expected tests takes '$other'"; failed=1; }
 done
+echo 'sanitised Planted.* planted' >"$plot/list"
+must_be_red "expected tests: unknown kind" "list:1: a line is KIND PATTERN REASON, with one of the kinds any," reason thread Planted.Case
+
+# The suite, with lists of its own, over a build of two tests: one is skipped, one needs a further round.
+mkdir -p "$plot/suite" "$plot/two"
+cp tests/*.py "$plot/suite/"
+echo 'SANITIZER:STRING=' >"$plot/two/CMakeCache.txt"
+cat >"$plot/two/CTestTestfile.cmake" <<'EOF'
+add_test(Planted.Skip sh -c "exit 77")
+set_tests_properties(Planted.Skip PROPERTIES SKIP_RETURN_CODE 77)
+add_test(Planted.Round sh -c "echo further round: Planted.Round: a core stood still")
+EOF
+skip='any Planted.Skip planted' round='any Planted.Round rounds planted'
+# suite SKIPS RETRIES: the whole run with these lists
+suite() {
+  echo "$1" >"$plot/suite/skips.txt"
+  echo "$2" >"$plot/suite/retries.txt"
+  PYTHONDONTWRITEBYTECODE=1 "$plot/suite/suite.py" "$plot/two"
+}
+suite "$skip" "$round" >"$plot/log" 2>&1 || { echo "the suite of two listed tests fails:"; cat "$plot/log"; failed=1; }
+must_be_red "suite: skipped and not listed" "skipped: Planted.Skip: NOT EXPECTED (tests/skips.txt)" suite "" "$round"
+must_be_red "suite: skipped and listed for another kind" "skipped: Planted.Skip: NOT EXPECTED" suite "thread Planted.Skip planted" "$round"
+must_be_red "suite: further round and not listed" "further round: Planted.Round: a core stood still: NOT EXPECTED (tests/retries.txt)" suite "$skip" ""
+must_be_red "suite: further round and listed as a second run" "a core stood still: NOT EXPECTED" suite "$skip" "any Planted.Round time planted"
+must_be_red "suite: listed skip of no test" "skips.txt:2: no test matches Planted.Gone:" suite "$skip
+any Planted.Gone planted" "$round"
+must_be_red "suite: listed retry of no test" "retries.txt:2: no test matches Planted.Gone:" suite "$skip" "$round
+plain Planted.Gone time planted"
+suite "$skip
+sanitized Planted.Gone planted" "$round" >"$plot/log" 2>&1 || { echo "the plain build holds lines of the sanitizers:"; cat "$plot/log"; failed=1; }
 exit $failed

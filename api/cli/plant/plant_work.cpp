@@ -228,6 +228,7 @@ std::vector<PlantFinding> work_on(const Plant& plant, const HostSelection& selec
         if (found[i].empty()) found[i] = (HostWork(*hosts[i], selection, work).*step)(participant);
       }
     };
+    // Threads: the changes of a host follow each other, and each call of HostWork waits for its answer.
     std::vector<std::jthread> threads;
     for (std::size_t i = 0; i < std::min(kAtOnce, hosts.size()); ++i) threads.emplace_back(work_through);
   };

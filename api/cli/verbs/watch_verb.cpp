@@ -32,7 +32,8 @@ int watch(CliSession& session, const WatchArguments& arguments) {
 }  // namespace
 
 void add_watch_verb(const Command& plcctl, CliSession& session) {
-  const Command verb = plcctl.verb("watch", "Show tasks, changes of state, or of one object, as they come");
+  const Command verb = plcctl.verb(
+      "watch", "Show changes of state as they come, or look at tasks or one object again and again");
   const auto arguments = std::make_shared<WatchArguments>();
   constexpr double kMinInterval = 0.1;
   constexpr double kMaxInterval = 3600;

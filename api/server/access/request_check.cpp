@@ -41,7 +41,7 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
     case Argument::file:
       return check_file_name(argument);
     case Argument::scheduler:
-      return check_name("scheduler", argument, 31);
+      return check_name("scheduler", argument, kMaxSchedulerName);
     case Argument::event:
       return check_name("event", argument, kMaxEventName);
     case Argument::task_or_none:

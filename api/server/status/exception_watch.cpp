@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include <code_words.hpp>
 #include <sys/stat.h>
 
+#include "api/dds/field_info.hpp"
 #include "api/dds/text.hpp"
 #include "shm/log/log.hpp"
 
@@ -68,7 +70,7 @@ void ExceptionWatch::show(plc_ExceptionStatus& sample, const ExceptionHistory& h
   sample.whole_application = !history.entries.empty() && last.whole_application;
   sample.time_unix_ns = last.unix_ns;
   dds::copy_text(sample.task, last.task);
-  dds::copy_text(sample.kind, last.kind);
+  sample.kind = dds::code_for(dds::words::ExceptionStatus::kind, last.kind);
   dds::copy_text(sample.signal, last.signal);
   sample.address = last.address;
   dds::copy_text(sample.symbol, last.symbol);

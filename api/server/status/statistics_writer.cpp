@@ -9,6 +9,7 @@
 #include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/histogram_digest.hpp"
+#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 

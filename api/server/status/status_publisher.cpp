@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include <code_words.hpp>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "api/dds/field_info.hpp"
 #include "api/dds/text.hpp"
-#include "api/server/status/instance_extension.hpp"
+#include "api/server/status/instance_runtime.hpp"
 
 namespace plchost {
 
@@ -16,7 +18,7 @@ namespace {
 void put_plan(const InstancePlan& plan, plc_InstanceStatus& sample) noexcept {
   dds::copy_text(sample.configured, plan.application.view());
   dds::copy_text(sample.settings, plan.settings.view());
-  dds::copy_text(sample.priority_band, plan.priority_band.view());
+  sample.priority_band = dds::code_for(dds::words::InstanceStatus::priority_band, plan.priority_band.view());
   dds::copy_text(sample.after, plan.after.view());
   sample.autostart = plan.autostart != 0;
   sample.restart_policy = std::to_underlying(plan.restart);

@@ -55,7 +55,9 @@ Result<void> fill_kind(const Task_Info& task, const std::shared_ptr<TaskCode>& c
   if (kind.has_interval) {
     config.interval = interval_of(task);
     if (config.interval <= Duration::zero() || config.interval > kMaxInterval)
-      return invalid_task(fmt::format("dwInterval must be above 0 and at most 50 days (kind {})", kind.name));
+      return invalid_task(fmt::format("dwInterval must be above 0 and at most {} days (kind {})",
+                                      std::chrono::floor<std::chrono::days>(kMaxInterval).count(),
+                                      kind.name));
   }
   if (kind.reads_variable) {
     if (task.dwEventFunctionPointer == nullptr)

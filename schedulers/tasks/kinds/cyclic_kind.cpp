@@ -19,8 +19,9 @@ class CyclicKind final : public TaskKindState {
 
   [[nodiscard]] static Result<void> check(const TaskConfig& task) {
     if (task.interval <= Duration::zero() || task.interval > kMaxInterval) {
-      return bad_task(task, "a cyclic task needs an interval above 0 and at most 50 days; it has " +
-                                std::to_string(task.interval.count()) + " ns");
+      return bad_task(task, "a cyclic task needs an interval above 0 and at most " +
+                                std::to_string(std::chrono::floor<std::chrono::days>(kMaxInterval).count()) +
+                                " days; it has " + std::to_string(task.interval.count()) + " ns");
     }
     if (task.start_offset >= Duration::zero() && task.start_offset < task.interval) return {};
     return bad_task(task, "its start offset of " + std::to_string(task.start_offset.count()) +

@@ -70,7 +70,7 @@ TEST_F(ExceptionOfAnInstance, IsShownWithAllThatIsKnown) {
   ASSERT_TRUE(eventually_shown(1));
   const auto seen = shown("line1").value();
   EXPECT_STREQ(seen.task, "Fill");
-  EXPECT_STREQ(seen.kind, "signal");
+  EXPECT_EQ(seen.kind, 1U);
   EXPECT_STREQ(seen.signal, "SIGFPE");
   EXPECT_STREQ(seen.symbol, "divide()+0x12 in line.so");
   EXPECT_STREQ(seen.text, "integer division by zero");
@@ -82,6 +82,20 @@ TEST_F(ExceptionOfAnInstance, IsShownWithAllThatIsKnown) {
   add("Label");
   ASSERT_TRUE(eventually_shown(2));
   EXPECT_STREQ(shown("line1")->task, "Label");
+}
+
+// As a record on disk that somebody has changed.
+TEST_F(ExceptionOfAnInstance, OfAKindThatTheContractDoesNotHaveIsOfNone) {
+  ExceptionEntry entry;
+  entry.task = "Fill";
+  entry.kind = "boredom";
+  ExceptionHistory history;
+  history.add(entry);
+  ASSERT_TRUE(write_exceptions(path(), history));
+  ASSERT_TRUE(eventually_shown(1));
+  EXPECT_EQ(shown("line1")->kind, 0U);
+  const auto json = nlohmann::json::parse(run({"show", "exception", "line1", "--json"}).output);
+  EXPECT_EQ(json[0]["kind"], "none");
 }
 
 TEST_F(ExceptionOfAnInstance, IsPresentUntilTheProcessIsReplaced) {

@@ -24,6 +24,7 @@
 #include "shm/base/thread.hpp"
 #include "shm/sockets/packet_socket.hpp"
 #include "tests/integration/api/test_host.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost {
 namespace {
@@ -78,7 +79,7 @@ class CountingInstance {
     auto link = PacketSocket::connect(instance_socket_path(host_.run_directory(), "line1")).value();
     ASSERT_TRUE(link.send(
         encode(ControlRequest{.number = 1, .verb = verb, .instance = "line1", .argument = argument})));
-    const auto packet = link.receive_until(soon());
+    const auto packet = receive_until(link, soon());
     ASSERT_TRUE(packet) << packet.error().describe();
     const auto reply = decode_reply(*packet);
     ASSERT_TRUE(reply);

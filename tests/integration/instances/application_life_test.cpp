@@ -12,6 +12,7 @@
 #include "instances/launch/launch_contract.hpp"
 #include "shm/pages/exception_history.hpp"
 #include "tests/integration/instances/instance_process.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -64,7 +65,7 @@ class LifeInProcess : public ::testing::Test {
   }
   static void expect_stop_timeout(const ExceptionEntry& entry, const std::string& task, int limit_ms,
                                   const std::string& phase) {
-    EXPECT_EQ(entry.kind, "stop timeout");
+    EXPECT_EQ(entry.kind, "stop_timeout");
     EXPECT_EQ(entry.task, task);
     EXPECT_THAT(entry.text, AllOf(HasSubstr(fmt::format("after {} ms", limit_ms)), HasSubstr(phase)));
     EXPECT_THAT(entry.application, HasSubstr("held.so"));
@@ -84,7 +85,7 @@ class LifeInProcess : public ::testing::Test {
     EXPECT_TRUE(socket.send(encode(ControlRequest{number, verb, "line1", ""})));
   }
   static ControlReply receive(PacketSocket& socket) {
-    const auto packet = socket.receive_until(MonotonicClock::now() + 30s);
+    const auto packet = receive_until(socket, MonotonicClock::now() + 30s);
     EXPECT_TRUE(packet);
     return packet ? decode_reply(*packet).value_or(ControlReply{}) : ControlReply{};
   }
@@ -160,7 +161,7 @@ TEST_F(LifeInProcess, GoesToExceptionByAnEventVariableThatDoesNotReturnInAStop) 
   std::this_thread::sleep_for(20ms);  // twenty polls
   expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Edge (its event variable, after 300 ms)");
   ASSERT_EQ(exceptions().size(), 1U);
-  EXPECT_EQ(exceptions()[0].kind, "stop timeout");
+  EXPECT_EQ(exceptions()[0].kind, "stop_timeout");
   EXPECT_EQ(exceptions()[0].task, "Edge");
   EXPECT_THAT(exceptions()[0].text, HasSubstr("its event variable has not returned after 300 ms"));
   expect_exception_of("Edge");
@@ -268,7 +269,7 @@ TEST_F(LifeInProcess, AnswersAStopThatAnEndOfTheProcessOvertakes) {
   ASSERT_TRUE(wait_for(ApplicationState::stopping));
   EXPECT_EQ(sut_->ask(ControlVerb::shutdown).code, ErrorCode::ok);
   EXPECT_EQ(sut_->end(SIGTERM), EXIT_FAILURE);
-  const auto packet = socket.receive_until(MonotonicClock::now() + 30s);
+  const auto packet = receive_until(socket, MonotonicClock::now() + 30s);
   ASSERT_FALSE(packet);
   EXPECT_EQ(packet.error().code, ErrorCode::unavailable);
 }

@@ -13,6 +13,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "tests/integration/instances/instance_process.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -27,7 +28,7 @@ class ControlSocket : public ::testing::Test {
   void SetUp() override { sut_.wait_until_up(); }
 
   static ControlReply reply(PacketSocket& socket) {
-    const auto packet = socket.receive_until(MonotonicClock::now() + 20s);
+    const auto packet = receive_until(socket, MonotonicClock::now() + 20s);
     EXPECT_TRUE(packet);
     return packet ? decode_reply(*packet).value_or(ControlReply{}) : ControlReply{};
   }

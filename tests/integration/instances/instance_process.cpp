@@ -20,7 +20,9 @@
 #include "instances/launch/launch_contract.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/variables/symbol_page.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 
@@ -49,6 +51,7 @@ Sandbox::~Sandbox() {
   for (const char* instance : {"line1", "line2", "line3"}) {
     InstancePage::remove(pool_, instance);
     TransitionRing::remove(pool_, instance);
+    SymbolPage::remove(pool_, instance);
   }
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
@@ -164,7 +167,7 @@ ControlReply InstanceProcess::ask(ControlVerb verb, const std::string& argument)
   using namespace std::chrono_literals;
   PacketSocket socket = connect();
   EXPECT_TRUE(socket.send(encode(ControlRequest{77, verb, "line1", argument})));
-  const auto packet = socket.receive_until(MonotonicClock::now() + 20s);
+  const auto packet = receive_until(socket, MonotonicClock::now() + 20s);
   if (!packet) return {.number = 0, .code = packet.error().code, .text = packet.error().describe()};
   return decode_reply(*packet).value_or(
       ControlReply{.number = 0, .code = ErrorCode::corrupt, .text = *packet});

@@ -15,6 +15,7 @@
 #include "shm/base/thread.hpp"
 #include "shm/pages/exception_history.hpp"
 #include "tests/integration/instances/instance_process.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -295,7 +296,7 @@ TEST(OnlineChangeOfAnInstance, ThatWaitsIsGivenUpForAStop) {
       encode(ControlRequest{5, ControlVerb::change_application, "line1", application("online_2")})));
   ASSERT_TRUE(eventually([&] { return sut.process().log().contains("init of version 2"); }));
   EXPECT_EQ(sut.process().ask(ControlVerb::stop).code, ErrorCode::ok);
-  const auto packet = changer.receive_until(MonotonicClock::now() + 20s);
+  const auto packet = receive_until(changer, MonotonicClock::now() + 20s);
   ASSERT_TRUE(packet);
   const auto refused = decode_reply(*packet).value();
   EXPECT_EQ(refused.code, ErrorCode::refused);

@@ -17,6 +17,7 @@
 #include "tests/integration/instances/instance_process.hpp"
 #include "tests/support/held_pool_lock.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -137,7 +138,7 @@ std::vector<SetupReport> reports_of(const Sandbox& sandbox, const std::string& p
   PacketSocket socket{UniqueFd(ends[0])};
   std::vector<SetupReport> reports;
   while (true) {
-    const auto packet = socket.receive_until(MonotonicClock::now() + 20s);
+    const auto packet = receive_until(socket, MonotonicClock::now() + 20s);
     const auto report =
         packet ? decode_report(*packet) : Result<SetupReport>(std::unexpected(packet.error()));
     if (!report) break;
@@ -211,7 +212,7 @@ Scarce start_with_descriptors(const Sandbox& sandbox, rlim_t descriptors, const 
   PacketSocket socket{UniqueFd(ends[0])};
   Scarce seen;
   while (!seen.up) {
-    const auto packet = socket.receive_until(MonotonicClock::now() + 60s);
+    const auto packet = receive_until(socket, MonotonicClock::now() + 60s);
     const auto report =
         packet ? decode_report(*packet) : Result<SetupReport>(std::unexpected(packet.error()));
     if (!report) break;

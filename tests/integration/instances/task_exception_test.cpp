@@ -124,10 +124,10 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"alloca", "Alloca", "signal", "SIGSEGV", "stack overflow", "overflow_at_once()+0x"},
         Fault{"abort", "Abort", "signal", "SIGABRT", "abort", ""},
         Fault{"illegal", "Illegal", "signal", "SIGILL", "illegal instruction", "task_faults.so"},
-        Fault{"throw", "Throw", "C++ exception", "", "std::runtime_error left its cycle: the valve is stuck",
+        Fault{"throw", "Throw", "cpp_exception", "", "std::runtime_error left its cycle: the valve is stuck",
               ""},
-        Fault{"loop", "Loop", "task watchdog", "", "the limit is 20.000 ms", "loop()+0x"},
-        Fault{"sleep", "Sleep", "task watchdog", "", "the limit is 20.000 ms", ""},
+        Fault{"loop", "Loop", "task_watchdog", "", "the limit is 20.000 ms", "loop()+0x"},
+        Fault{"sleep", "Sleep", "task_watchdog", "", "the limit is 20.000 ms", ""},
         Fault{"variable", "Edge", "signal", "SIGFPE",
               "integer division by zero or overflow in its event variable", "divide()+0x"}),
     [](const auto& test) { return std::string(test.param.event); });
@@ -171,7 +171,7 @@ TEST_P(EachScheduler, HitsAtTheTwentiethOverrunInARow) {
   EXPECT_TRUE(sut.runs("Later"));
   (void)sut.process().event("overrun").post();
   const auto found = sut.exceptions().front();
-  EXPECT_EQ(found.kind, "consecutive overruns");
+  EXPECT_EQ(found.kind, "consecutive_overruns");
   EXPECT_THAT(found.text, HasSubstr("20 cycles in a row took longer than 2.000 ms"));
   expect_stopped_and_reachable(sut, "Later");
 }
@@ -182,7 +182,7 @@ TEST_P(EachScheduler, SeesACycleThatNeverRan) {
   std::this_thread::sleep_for(300ms);  // cycles right after a start are not counted
   (void)sut.process().event("starve").post();
   const auto found = sut.exceptions().front();
-  EXPECT_EQ(found.kind, "omitted cycles");
+  EXPECT_EQ(found.kind, "omitted_cycles");
   EXPECT_EQ(found.task, "Low");
   expect_stopped_and_reachable(sut, "Low");
 }
@@ -213,7 +213,7 @@ TEST_P(AThreadThatTakesTheProcessor, LosesItAndPutsTheApplicationIntoException) 
   Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=600\n");
   sut.process().event(GetParam()).post();
   const ExceptionEntry exception = sut.exceptions().front();
-  EXPECT_EQ(exception.kind, "no processor");
+  EXPECT_EQ(exception.kind, "no_processor");
   EXPECT_THAT(exception.text,
               AllOf(HasSubstr("thread 'hog' (SCHED_FIFO "), HasSubstr("the limit is 300 ms")));
   EXPECT_TRUE(exception.whole_application);
@@ -317,7 +317,7 @@ TEST(TaskException, OfTheLoadNamesTheTaskThatUsedTheMost) {
   EXPECT_EQ(sut.state_of("Later"), PageTaskState::running);
   (void)sut.process().event("busy").post();
   const auto found = sut.exceptions().front();
-  EXPECT_EQ(found.kind, "processor load");
+  EXPECT_EQ(found.kind, "processor_load");
   EXPECT_EQ(found.task, "Later");
   expect_stopped_and_reachable(sut, "Later");
 }
@@ -328,7 +328,7 @@ TEST(TaskException, OfAnOverloadEndsATaskThatNeverLeavesTheCore) {
   for (const char* const scheduler : {"CmpScheduleTimer", "CmpScheduleOneShot"}) {
     Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=100\n", scheduler, "overload", "low");
     const auto found = sut.exceptions().front();
-    EXPECT_EQ(found.kind, "processor load");
+    EXPECT_EQ(found.kind, "processor_load");
     EXPECT_EQ(found.task, "Overload");
     EXPECT_THAT(found.text, HasSubstr("90"));
     expect_stopped_and_reachable(sut, "Overload");

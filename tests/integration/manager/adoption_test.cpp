@@ -8,6 +8,7 @@
 #include <sys/resource.h>
 
 #include "tests/integration/manager/plant.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost {
 namespace {
@@ -122,7 +123,7 @@ TEST(Manager, SurvivesGarbageOnItsControlSocket) {
     hostile = plant.connect();
   }
   (void)hostile.send("{\"version\":2}");
-  const auto reply = hostile.receive_until(MonotonicClock::now() + std::chrono::seconds(30));
+  const auto reply = receive_until(hostile, MonotonicClock::now() + std::chrono::seconds(30));
   ASSERT_TRUE(reply) << reply.error().describe();
   EXPECT_EQ(decode_reply(*reply)->code, ErrorCode::corrupt);
   // A client that goes away in the middle of its request.

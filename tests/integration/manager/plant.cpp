@@ -16,6 +16,7 @@
 #include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost {
 
@@ -39,6 +40,7 @@ Plant::~Plant() {
   for (const std::string& name : names_) {
     InstancePage::remove(pool_, name);
     TransitionRing::remove(pool_, name);
+    MemoryFile::remove(pool_ + ".variables." + name);
     LogRing::remove(pool_, name);
     MemoryFile::remove(pool_ + ".wish." + name);
   }
@@ -179,7 +181,7 @@ ControlReply Plant::ask(ControlVerb verb, const std::string& instance, const std
   auto link = connect();
   EXPECT_TRUE(link.send(
       encode(ControlRequest{.number = 42, .verb = verb, .instance = instance, .argument = argument})));
-  const auto packet = link.receive_until(MonotonicClock::now() + kPatience);
+  const auto packet = receive_until(link, MonotonicClock::now() + kPatience);
   if (!packet) return {.number = 0, .code = ErrorCode::timed_out, .text = packet.error().describe()};
   const auto reply = decode_reply(*packet);
   return reply ? *reply : ControlReply{.number = 0, .code = ErrorCode::corrupt, .text = *packet};

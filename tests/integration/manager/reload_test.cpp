@@ -16,6 +16,7 @@
 #include "shm/files/memory_file.hpp"
 #include "tests/integration/manager/costs_cycles.hpp"
 #include "tests/integration/manager/plant.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost {
 namespace {
@@ -313,7 +314,7 @@ TEST_F(ReloadOfTheHost, EndsTheApiServerWhenCommandsAreAnsweredOnly) {
   EXPECT_EQ(reload_with({"[dds]\n", "[dds]\nmulticast = false\n"}).text, line("[dds] multicast"));
   EXPECT_FALSE(Plant::within(std::chrono::seconds(1), [&] { return servers().size() > 1; }));
   ASSERT_TRUE(signal_process(*process, SIGCONT));
-  EXPECT_TRUE(link.receive_until(MonotonicClock::now() + std::chrono::seconds(30)));
+  EXPECT_TRUE(receive_until(link, MonotonicClock::now() + std::chrono::seconds(30)));
   EXPECT_TRUE(Plant::eventually([&] { return servers().size() == 2; }));
   expect_nothing_left();
 }
@@ -420,7 +421,7 @@ TEST_F(Reload, IsDoneOnceForEachOfSeveralThatCome) {
   }
   std::string all;
   for (int i = 0; i < 3; ++i) {
-    const auto packet = link.receive_until(MonotonicClock::now() + std::chrono::seconds(30));
+    const auto packet = receive_until(link, MonotonicClock::now() + std::chrono::seconds(30));
     ASSERT_TRUE(packet);
     all += decode_reply(*packet)->text + "\n";
   }

@@ -108,6 +108,17 @@ kill_the_manager() {
 costs_no_cycle line1/Output kill_the_manager
 application_is "$kept/000003.so" || fail "$(plcctl list instances)"
 
+echo "- nor does a plchost-dds that is killed"
+kill_the_server() {
+  server=$(pgrep -P "$manager" -x plchost-dds)
+  kill -KILL "$server"
+  another_server() { pgrep -P "$manager" -x plchost-dds | grep -qvx "$server"; }
+  until_true 20 another_server
+  until_true 20 state_is line1 running
+}
+costs_no_cycle line1/Output kill_the_server
+is "$(instance line1 pid)" "$pid" || fail "another process"
+
 echo "- of more than [host] application_versions the oldest goes, but not the boot application"
 plcctl load application line1 "$kept/000002.so" --on-host --boot
 for file in packer bottling_line packer bottling_line; do plcctl load application line1 "$APPLICATIONS/$file.so"; done

@@ -54,7 +54,7 @@ server=$(host_field cell4 server_pid)
 kill -KILL "$server"
 other_server() { [ "$(host_field cell4 server_pid)" != "$server" ]; }
 until_true 30 other_server
-before=$(pid_of cell5)
+before=$(pid_of cell5) cycles=$(cycles_of cell5)
 kill -KILL "${managers[4]}"
 wait "${managers[4]}" 2>/dev/null || true
 until_true 30 sees "${all/cell5 /}"
@@ -63,6 +63,7 @@ start_manager_within cell5
 until_true 30 sees "$all"
 adopted() { is "$(pid_of cell5)" "$before"; }
 until_true 30 adopted
+[ "$(cycles_of cell5)" -gt "$cycles" ] || fail "cell5 stood still without a manager"
 
 echo "- a second cell1 is refused; the first one goes on, and tells of it"
 write_member twin

@@ -66,7 +66,7 @@ until_true 20 line1_is_back
 is "$(instance drive1 pid)" "$drive" || fail "drive1 is another process"
 undisturbed drive1 "$cycles" "$lost"
 
-echo "- kill -9 of the API server costs a reconnect: the PLCs lose no cycles"
+echo "- kill -9 of the API server costs a reconnect: the PLCs go on"
 read -r cycles lost <<<"$(totals drive1)"
 kill -KILL "$(pgrep -P "$manager" -x plchost-dds)"
 until_true 20 state_is drive1 running

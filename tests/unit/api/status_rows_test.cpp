@@ -12,6 +12,7 @@
 #include "api/client/status_count.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/fault_record.hpp"
 #include "shm/base/task_kind.hpp"
 #include "shm/pool/pool_layout.hpp"
 
@@ -216,6 +217,17 @@ TEST(StatusWords, OfTheTypesOfObjectsAreThoseOfTheirTable) {
     EXPECT_EQ(word(std::to_underlying(traits.type)), traits.name);
   EXPECT_EQ(word(kObjectTypes), std::to_string(kObjectTypes))
       << "the contract names a type that is not in the table";
+}
+
+TEST(StatusWords, OfTheKindsOfExceptionsAreThoseOfTheirRecords) {
+  const auto& words = dds::words::ExceptionStatus::kind;
+  for (std::uint32_t code = 1; code < words.size(); ++code)
+    EXPECT_EQ(words.at(code), to_string(static_cast<FaultKind>(code - 1)));
+  EXPECT_EQ(to_string(static_cast<FaultKind>(words.size() - 1)), "unknown")
+      << "the contract has no word for it";
+  EXPECT_EQ(dds::code_for(words, "stop_timeout"), 7U);
+  EXPECT_EQ(dds::code_for(words, ""), 0U);
+  EXPECT_EQ(dds::code_for(words, "none of them"), 0U);
 }
 
 TEST(StatusOrder, IsThatOfTheContract) {

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "tests/support/own_name.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost {
 namespace {
@@ -51,8 +52,8 @@ TEST_F(PacketSocketTest, KeepsPacketsWholeAndInOrder) {
   connect();
   ASSERT_TRUE(client_.send("one"));
   ASSERT_TRUE(client_.send("two"));
-  EXPECT_EQ(server_.receive_until(soon()), "one");
-  EXPECT_EQ(server_.receive_until(soon()), "two");
+  EXPECT_EQ(receive_until(server_, soon()), "one");
+  EXPECT_EQ(receive_until(server_, soon()), "two");
   EXPECT_EQ(server_.receive().value(), std::nullopt);
 }
 
@@ -60,7 +61,7 @@ TEST_F(PacketSocketTest, CarriesTheLargestPacketAndRefusesLarger) {
   connect();
   const std::string largest(kMaxPacket, 'x');
   ASSERT_TRUE(client_.send(largest));
-  EXPECT_EQ(server_.receive_until(soon()), largest);
+  EXPECT_EQ(receive_until(server_, soon()), largest);
   EXPECT_EQ(client_.send(largest + "x").error().code, ErrorCode::invalid_argument);
   EXPECT_EQ(client_.send("").error().code, ErrorCode::invalid_argument);
 }
@@ -91,7 +92,7 @@ TEST_F(PacketSocketTest, IsBusyWhenThePeerDoesNotRead) {
 TEST_F(PacketSocketTest, TimesOutWithoutAPacket) {
   connect();
   const TimePoint deadline = MonotonicClock::now() + std::chrono::milliseconds(5);
-  EXPECT_EQ(server_.receive_until(deadline).error().code, ErrorCode::timed_out);
+  EXPECT_EQ(receive_until(server_, deadline).error().code, ErrorCode::timed_out);
   EXPECT_GE(MonotonicClock::now(), deadline);
 }
 

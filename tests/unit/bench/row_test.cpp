@@ -61,6 +61,11 @@ TEST(Summary, HasNoPercentileThatNoSampleLiesAbove) {
   EXPECT_TRUE(std::isnan(summarise(one_to(999)).p999));
 }
 
+TEST(Summary, DecidesByNoPercentileThatFewSamplesLieAbove) {
+  EXPECT_TRUE(std::isnan(decisive_p999(one_to(19'499))));
+  EXPECT_EQ(decisive_p999(one_to(20'000)), 19'981);
+}
+
 TEST(Ratio, ToAFloorThatIsNoneIsNone) {
   EXPECT_TRUE(std::isnan(ratio(3, 0)));
   EXPECT_TRUE(std::isnan(ratio(3, kNotMeasured)));
@@ -129,6 +134,23 @@ TEST(Rounds, MakeTheVerdict) {
   EXPECT_EQ(verdict_of(rounds({kNotMeasured, kNotMeasured})[0], 0).text(), "not measured");
 }
 
+TEST(Rounds, FurtherApartThanTheBoundDecideNothingWhereItMustBeSteady) {
+  const auto verdict = [](const std::vector<double>& measured) {
+    std::vector<Row> all;
+    for (const double one : measured) {
+      Row row = round_of(one, 10);
+      row.targets[0].only_steady = true;
+      add_round(all, {std::move(row)});
+    }
+    return verdict_of(all[0], 0).text();
+  };
+  EXPECT_EQ(verdict({-4, 1, 5}), "met");
+  EXPECT_EQ(verdict({-6, 1, 5}), "not measured");
+  EXPECT_EQ(verdict({8, 12, kNotMeasured}), "met in 1 of 2 rounds");
+  EXPECT_EQ(verdict({12}), "not met");
+  EXPECT_EQ(verdict({kNotMeasured}), "not measured");
+}
+
 TEST(Json, IsOneArrayWithARowForEach) {
   auto rows = rounds({1, 12, 3});
   rows[0].conditions = {{"load_average", 1.5}, {"load_average", 2.5}};
@@ -180,7 +202,7 @@ TEST(Table, SaysWhatWasNotMeasured) {
 TEST(Apart, GivesTheRowsOfAnotherProcess) {
   Row row = round_of(3, 10);
   row.note = "with \"quotes\" and\na line";
-  row.targets.push_back({"none", "us", kNotMeasured, 1, true});
+  row.targets.push_back({"none", "us", kNotMeasured, 1, true, true});
   const auto sut = measure_apart([&]() -> Result<std::vector<Row>> { return std::vector<Row>(2, row); });
   ASSERT_TRUE(sut);
   ASSERT_EQ(sut->size(), 2U);
@@ -189,6 +211,7 @@ TEST(Apart, GivesTheRowsOfAnotherProcess) {
   EXPECT_EQ(again.ours.values(), row.ours.values());
   EXPECT_EQ(again.note, row.note);
   EXPECT_TRUE(again.targets[1].or_equal);
+  EXPECT_TRUE(again.targets[1].only_steady);
   EXPECT_TRUE(std::isnan(again.targets[1].measured));
 }
 

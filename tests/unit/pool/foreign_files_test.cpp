@@ -116,6 +116,7 @@ TEST_F(ForeignFiles, UnderAnyNameOfTheHostAreTakenAwayAndToldAndOthersStay) {
   plant_file(instance_claim_name(pool, "line1"));
   plant_file(pool + ".posts");
   plant_file(pool + ".wish.line1");
+  plant_file(pool + ".variables.line1");
   plant_file(pool_memory_name(pool, "line1.retain"));
   plant_file(pool_memory_name(pool, "image"));
   const std::string others = pool + "-another.host";

@@ -246,7 +246,7 @@ TEST_F(TaskTest, StopThatItDoesNotComeBackForIsAFaultOfTheWholeApplication) {
   raise_stop_timeout(sut.fault(), StopPhase::others, milliseconds(300));  // the first one is kept
   const FaultRecord* const record = sut.fault().published();
   ASSERT_NE(record, nullptr);
-  EXPECT_EQ(to_string(record->kind), "stop timeout");
+  EXPECT_EQ(to_string(record->kind), "stop_timeout");
   EXPECT_EQ(describe_fault(*record),
             "not at the end of its cycle after 200 ms, the limit of the first phase of a stop (tasks that "
             "drive outputs)");

@@ -1,4 +1,4 @@
-#include "api/server/status/instance_extension.hpp"
+#include "api/server/status/instance_runtime.hpp"
 
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-#include "api/server/status/instance_extension.hpp"
+#include "api/server/status/instance_runtime.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ plc_InstanceStatus status_with(std::vector<plc_KeyValue>& entries) {
   return status;
 }
 
-TEST(InstanceExtension, CarriesWhatTheInstanceSays) {
+TEST(InstanceRuntimeStatus, CarriesWhatTheInstanceSays) {
   InstanceRuntime runtime;
   plc_InstanceStatus status{};
   put_runtime(runtime, status);
@@ -32,7 +32,7 @@ TEST(InstanceExtension, CarriesWhatTheInstanceSays) {
   EXPECT_EQ(row["idle_states"], "held for core 1");
 }
 
-TEST(InstanceExtension, ItsProblemsAreThoseThatTheManagerAndThisProcessKnow) {
+TEST(InstanceRuntimeStatus, ItsProblemsAreThoseThatTheManagerAndThisProcessKnow) {
   InstanceStatus status;
   status.pid = 7;
   EXPECT_EQ(problem_of_instance(status, nullptr), "");
@@ -47,7 +47,7 @@ TEST(InstanceExtension, ItsProblemsAreThoseThatTheManagerAndThisProcessKnow) {
   EXPECT_EQ(problem_of_instance(status, &runtime), "safe mode") << "that process has ended";
 }
 
-TEST(InstanceExtension, TellsOfTheDistributedClockOnceThereIsOne) {
+TEST(InstanceRuntimeStatus, TellsOfTheDistributedClockOnceThereIsOne) {
   InstanceRuntime runtime;
   const auto row = [&] {
     plc_InstanceStatus status{};
@@ -75,7 +75,7 @@ TEST(InstanceExtension, TellsOfTheDistributedClockOnceThereIsOne) {
   EXPECT_EQ(row()["clock_problem"], "no record");
 }
 
-TEST(InstanceExtension, IsShownByTheCliWhateverItsNames) {
+TEST(InstanceRuntimeStatus, IsShownByTheCliWhateverItsNames) {
   std::vector<plc_KeyValue> entries(2);
   dds::copy_text(entries[0].name, "of_a_newer_host");
   dds::copy_text(entries[0].value, "42");
