@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/receive_until.hpp"
+
 namespace plchost::testing {
 
 ValueClient::ValueClient(const Sandbox& sandbox) : sandbox_(sandbox) {
@@ -37,7 +39,7 @@ void ValueClient::send(const std::vector<VariableElement>& elements, ValueKind k
 
 std::optional<ValueReply> ValueClient::receive() {
   for (;;) {
-    const auto packet = socket_.receive_until(MonotonicClock::now() + std::chrono::seconds(20));
+    const auto packet = receive_until(socket_, MonotonicClock::now() + std::chrono::seconds(20));
     if (!packet) return std::nullopt;
     auto reply = reader_.take(*packet);
     EXPECT_TRUE(reply) << reply.error().describe();

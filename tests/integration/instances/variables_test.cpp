@@ -10,6 +10,7 @@
 
 #include "tests/integration/instances/instance_process.hpp"
 #include "tests/integration/instances/value_client.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -165,10 +166,10 @@ TEST_F(Variables, PacketsOfAStrangerEndHisConnectionOnly) {
        {std::string("x"), std::string(kMaxPacket, '\xff'), std::string(100, '\0')}) {
     auto stranger = PacketSocket::connect(values_socket_path(sandbox_.folder(), "line1")).value();
     ASSERT_TRUE(stranger.send(packet));
-    const auto answer = stranger.receive_until(MonotonicClock::now() + std::chrono::seconds(20));
+    const auto answer = receive_until(stranger, MonotonicClock::now() + std::chrono::seconds(20));
     ASSERT_TRUE(answer) << answer.error().describe();
     EXPECT_EQ(ValueReplyReader().take(*answer).value()->code, ErrorCode::corrupt);
-    EXPECT_EQ(stranger.receive_until(MonotonicClock::now() + std::chrono::seconds(20)).error().code,
+    EXPECT_EQ(receive_until(stranger, MonotonicClock::now() + std::chrono::seconds(20)).error().code,
               ErrorCode::unavailable);
   }
   EXPECT_EQ(read("Main.serial"), "4711");
@@ -180,7 +181,7 @@ TEST_F(Variables, ThereIsABoundOfConnections) {
   for (int i = 0; i < 20 && !told; ++i) {
     others.push_back(PacketSocket::connect(values_socket_path(sandbox_.folder(), "line1")).value());
     // The answer of one that is too many comes unasked.
-    const auto answer = others.back().receive_until(MonotonicClock::now() + std::chrono::milliseconds(500));
+    const auto answer = receive_until(others.back(), MonotonicClock::now() + std::chrono::milliseconds(500));
     told = answer.has_value();
     if (told) EXPECT_EQ(ValueReplyReader().take(*answer).value()->code, ErrorCode::busy);
   }
