@@ -1,6 +1,6 @@
 #pragma once
 
-/// What Application::variable() in plc_app.hpp takes from the type of a variable.
+/// The properties that Application::variable() in plc_app.hpp takes from the type of a variable.
 
 #include <array>
 #include <atomic>

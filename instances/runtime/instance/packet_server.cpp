@@ -17,8 +17,8 @@ namespace {
 
 Result<void> watch(const UniqueFd& epoll, int fd, std::uint32_t events = EPOLLIN) {
   epoll_event event{.events = events, .data = {.fd = fd}};
-  PLCHOST_TRY(
-      check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch a socket of the instance"));
+  PLCHOST_TRY(check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event),
+                          "cannot watch a socket of the instance"));
   return {};
 }
 
@@ -56,7 +56,7 @@ Result<PacketServer> PacketServer::listen(Options options) {
   PLCHOST_TRY_ASSIGN(auto listener, PacketListener::listen(options.path));
   reserve_descriptors();
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
-  if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
+  if (!epoll) return failure(ErrorCode::system, "cannot create an epoll descriptor", errno);
   // Told once for each new connection: one that cannot be taken must not keep the control thread awake.
   PLCHOST_TRY(watch(epoll, listener.fd(), EPOLLIN | EPOLLET));
   return PacketServer(std::move(listener), std::move(epoll), std::move(options));
