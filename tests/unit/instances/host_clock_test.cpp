@@ -196,7 +196,8 @@ TEST_F(HostReferenceTest, GivesPairsToTheTasks) {
 TEST_F(HostReferenceTest, SaysWhyThereIsNoClockAndTriesAgain) {
   system.missing = true;
   follow();
-  EXPECT_TRUE(eventually([&] { return sut->problem() == "open /dev/ptp0: No such file or directory"; }));
+  EXPECT_TRUE(
+      eventually([&] { return sut->problem() == "open /dev/ptp0: No such file or directory (ENOENT)"; }));
   EXPECT_EQ(status().pairs, 0U);
   system.missing = false;
   EXPECT_TRUE(eventually([&] { return status().pairs > 0; }));

@@ -162,7 +162,10 @@ EXPORTED int clock_gettime(clockid_t clock, timespec* to) noexcept {
     return real_time(clock, to);
   }
   if (is_gone()) return refuse(ENODEV);
-  const ptp_clock_time now = to_ptp(read_phc().at(nanoseconds(CLOCK_MONOTONIC)));
+  // The file takes its time: the clock is read in the middle of it.
+  const std::int64_t before = nanoseconds(CLOCK_MONOTONIC);
+  const SimulatedPhc phc = read_phc();
+  const ptp_clock_time now = to_ptp(phc.at(before + (nanoseconds(CLOCK_MONOTONIC) - before) / 2));
   *to = {.tv_sec = now.sec, .tv_nsec = now.nsec};
   return 0;
 }
