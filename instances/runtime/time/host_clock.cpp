@@ -12,6 +12,8 @@
 #include <fmt/format.h>
 #include <linux/ptp_clock.h>
 
+#include "schedulers/distributed_clock/clock_regulator.hpp"
+
 namespace plchost {
 
 namespace {
@@ -21,10 +23,10 @@ using Look = HostClock::Look;
 /// Two readings of how far CLOCK_REALTIME is ahead of CLOCK_MONOTONIC differ by no more, or it was set.
 constexpr Duration kSetBy = std::chrono::microseconds(2);
 
-// Nothing: the device says something that is no time.
+// Nothing: no time, or one that the regulator takes for rubbish.
 std::optional<std::int64_t> nanoseconds_of(std::int64_t seconds, std::int64_t nanoseconds) noexcept {
   constexpr std::int64_t kSecond = 1'000'000'000;
-  constexpr std::int64_t kMostSeconds = INT64_MAX / kSecond - 1;
+  constexpr std::int64_t kMostSeconds = ClockRegulator::kMaxReferenceNs / kSecond - 1;
   const bool whole = nanoseconds >= 0 && nanoseconds < kSecond;
   if (!whole || seconds > kMostSeconds || seconds < -kMostSeconds) return std::nullopt;
   return seconds * kSecond + nanoseconds;
@@ -143,7 +145,7 @@ class PtpClock final : public HostClock {
   }
 
   Result<Look> from_here() {
-    constexpr unsigned kDeviceClock = 3;  // FD_TO_CLOCKID of the kernel's clock tests
+    constexpr unsigned kDeviceClock = 3;  // the clock of a file descriptor: FD_TO_CLOCKID in clock_getres(2)
     const auto clock = static_cast<clockid_t>((~static_cast<unsigned>(device_.get()) << 3U) | kDeviceClock);
     return look_at(system_, clock, path_);
   }
