@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
+#include "api/server/status/host_grid.hpp"
 
 namespace plchost {
 
@@ -12,12 +13,6 @@ namespace {
 
 // The states of control.idl; a stranger may have written another one.
 constexpr std::uint32_t kClockStates = 6;
-
-// A value that moves by a little with each look would make each look news.
-std::int64_t to_hundreds(std::int64_t value) noexcept {
-  constexpr std::int64_t kHundred = 100;
-  return (value + (value < 0 ? -kHundred / 2 : kHundred / 2)) / kHundred * kHundred;
-}
 
 void add(std::string& problem, std::string_view more) {
   if (more.empty()) return;

@@ -248,10 +248,8 @@ Result<std::string> Instance::make_tasks() {
   PLCHOST_TRY_ASSIGN(tasks_,
                      TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment)));
   host_->task_table().attach(tasks_.get());
-  if (const std::string& reference = start_.settings.scheduler.distributed_clock.reference;
-      !reference.empty()) {
-    reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
-  }
+  reference_ = follow_reference(tasks_->distributed_clock(), start_.settings.scheduler.distributed_clock,
+                                options_.launch.pool);
   notify_tasks(EVT_ExternalEventTaskCreateDone);
   host_->notify(EVT_PrepareStart, {});
   for (const std::string& line :
@@ -305,7 +303,7 @@ void Instance::beat() {
     for (const std::string& news : tasks_->look_after_processor()) spdlog::warn("{}", news);
   }
   host_->events().refresh();
-  reference_.refresh();
+  if (reference_) reference_->refresh();
   InstanceRuntime runtime;
   runtime.pid = ::getpid();
   runtime.core = cores_.size() == 1 ? cores_.front() : -1;
@@ -321,7 +319,7 @@ void Instance::beat() {
   if (application_) runtime.application.assign(application_->path());
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
   runtime.clock.reference.assign(start_.settings.scheduler.distributed_clock.reference);
-  runtime.clock.problem.assign(reference_.problem());
+  if (reference_) runtime.clock.problem.assign(reference_->problem());
   runtime.variables = static_cast<std::uint32_t>(host_->variables().count());
   runtime.forces = static_cast<std::uint32_t>(host_->variables().forces().size());
   runtime.retain_problem.assign(host_->areas().retain_problem());

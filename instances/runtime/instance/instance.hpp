@@ -21,7 +21,7 @@
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/setup/process_setup.hpp"
 #include "instances/runtime/setup/setup_reporter.hpp"
-#include "instances/runtime/time/reference_memory.hpp"
+#include "instances/runtime/time/reference.hpp"
 #include "schedulers/task_set.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/transition_ring.hpp"
@@ -179,9 +179,9 @@ class Instance {
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
   bool page_lost_told_ = false;
-  TimePoint page_told_;             // when it was told last that the page was written over
-  std::uint64_t page_damages_ = 0;  // how often it was
-  ReferenceMemory reference_;
+  TimePoint page_told_;                   // when it was told last that the page was written over
+  std::uint64_t page_damages_ = 0;        // how often it was
+  std::unique_ptr<Reference> reference_;  // null: none is named
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them
   std::unique_ptr<OnlineChange> change_;  // waits for a moment between all cycles

@@ -197,8 +197,8 @@ Result<void> Instance::shut_down() {
     if (host_) host_->areas().finish();  // also what these two have changed
     // Only now: until then a thread of a component may have used a task's handle.
     if (host_) host_->task_table().attach(nullptr);
-    reference_.drop();
     tasks_.reset();
+    reference_.reset();
   }
   if (host_) {
     host_->write_messages();
