@@ -20,7 +20,7 @@ class GeneratedText {
   /// One line; `xml_line` is that of the element that it says.
   void add(std::string_view line, unsigned xml_line);
   void add_body(const std::vector<BodyLine>& lines, const std::string& pou);
-  /// The last line of a POU: what is missing at the end of its body is told there.
+  /// The last line of a POU: errors about the end of its body are told there.
   void end_body(std::string_view line);
 
   [[nodiscard]] const std::string& text() const noexcept { return text_; }

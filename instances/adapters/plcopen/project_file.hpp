@@ -40,7 +40,7 @@ class ProjectFile {
   [[nodiscard]] std::string identifier(const pugi::xml_node& element, const char* attribute,
                                        std::string_view of);
 
-  /// What to do with the elements of each name.
+  /// For each name of elements a function that takes one.
   using Handlers =
       std::initializer_list<std::pair<std::string_view, std::function<void(const pugi::xml_node&)>>>;
   /// Goes through the elements in `parent`, which errors call `where`. Documentation is left out. So is what

@@ -14,7 +14,7 @@ namespace plchost::plcopen {
 
 inline constexpr std::size_t kMostPrograms = 1024;  ///< instances in a resource
 
-/// What a project of PLCopen XML says, in ST. It has the file's name, and lines of its own.
+/// A project of PLCopen XML in ST. It has the file's name, and lines of its own.
 struct StructuredText {
   GeneratedText text;
   iec::SourceProblems problems;  ///< if there are any, the text is not whole
@@ -31,9 +31,9 @@ struct StructuredText {
 /// The sources of a build that are PLCopen XML.
 class ProjectSources {
  public:
-  /// Its ST, under the same name. What is wrong in it comes to `problems`.
+  /// Its ST, under the same name. All problems in it come to `problems`.
   [[nodiscard]] iec::Source take(const iec::Source& xml, iec::SourceProblems& problems);
-  /// What is told of the ST gets its places in the XML. The remarks of all XML come to the others.
+  /// Problems and remarks of the ST get their places in the XML. The remarks of all XML come to the others.
   void restore(iec::SourceProblems& problems, iec::SourceProblems& remarks) const;
 
  private:

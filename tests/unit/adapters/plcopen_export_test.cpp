@@ -1,4 +1,4 @@
-// What is exported as PLCopen XML is what the reader of such files understands.
+// The reader of PLCopen XML understands the files that an export writes.
 #include <string>
 #include <vector>
 
