@@ -58,7 +58,7 @@ class Types {
     return "";
   }
   std::string of(const xml_node& type, int depth) {
-    const std::string name(file_.name_of(type));
+    std::string name(file_.name_of(type));
     if (is_elementary(name)) return name;
     if (name == "string" || name == "wstring") return text_type(type, iec::folded(name));
     if (name == "derived") return file_.identifier(type, "name", where_);
@@ -72,7 +72,7 @@ class Types {
   }
   // A number, or an expression of constants.
   std::string bound(const xml_node& element, const char* attribute) {
-    const std::string text = one_line(element.attribute(attribute).value());
+    std::string text = one_line(element.attribute(attribute).value());
     if (is_one_value(text) && text.find_first_of(",[]") == std::string::npos) return text;
     return refuse(element, fmt::format("'{}' is not allowed as its {}", shown(text), attribute));
   }

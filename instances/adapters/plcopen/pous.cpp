@@ -19,12 +19,12 @@ namespace {
 
 using pugi::xml_node;
 
-struct Kind {
+struct PouKind {
   std::string_view name;
   std::string_view begin;
   std::string_view end;
 };
-constexpr std::array<Kind, 3> kKinds{
+constexpr std::array<PouKind, 3> kPouKinds{
     {{.name = "program", .begin = "PROGRAM", .end = "END_PROGRAM"},
      {.name = "functionBlock", .begin = "FUNCTION_BLOCK", .end = "END_FUNCTION_BLOCK"},
      {.name = "function", .begin = "FUNCTION", .end = "END_FUNCTION"}}};
@@ -91,8 +91,8 @@ class PouReader {
     const std::string name = file_.identifier(pou, "name", "a POU");
     where_ = "POU " + name;
     const std::string_view type = pou.attribute("pouType").value();
-    const auto* const kind = std::ranges::find(kKinds, type, &Kind::name);
-    if (kind == kKinds.end())
+    const auto* const kind = std::ranges::find(kPouKinds, type, &PouKind::name);
+    if (kind == kPouKinds.end())
       return file_.refuse(pou,
                           fmt::format("{}: pouType '{}' is not allowed; allowed are program, functionBlock "
                                       "and function",

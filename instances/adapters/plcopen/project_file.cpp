@@ -54,6 +54,7 @@ bool begins_with_new_line(std::string_view text) noexcept {
   if (is_hex) text.remove_prefix(1);
   unsigned code = 0;
   const char* const end = text.data() + text.size();
+  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
   const auto read = std::from_chars(text.data(), end, code, is_hex ? 16 : 10);
   return read.ec == std::errc() && code == '\n' && read.ptr != end && *read.ptr == ';';
 }

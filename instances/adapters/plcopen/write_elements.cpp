@@ -27,7 +27,7 @@ class TypeElements {
       xml_node array = parent.append_child("array");
       take("[");
       do {
-        xml_node dimension = array.append_child("dimension");
+        const xml_node dimension = array.append_child("dimension");
         set(dimension, "lower", take_until(".."));
         take("..");
         set(dimension, "upper", take_until(","));
@@ -55,11 +55,11 @@ class TypeElements {
   void add_simple(xml_node parent) {
     const std::string name = at_end() ? "" : folded(tokens_[next_++].text);
     if (name == "STRING" || name == "WSTRING") {
-      xml_node text = parent.append_child(name == "STRING" ? "string" : "wstring");
+      const xml_node text = parent.append_child(name == "STRING" ? "string" : "wstring");
       if (take("[") || take("(")) set(text, "length", take_until(""));
     } else if (is_elementary(name) && take("(")) {
       xml_node subrange = parent.append_child(name.starts_with('U') ? "subrangeUnsigned" : "subrangeSigned");
-      xml_node range = subrange.append_child("range");
+      const xml_node range = subrange.append_child("range");
       set(range, "lower", take_until(".."));
       take("..");
       set(range, "upper", take_until(""));

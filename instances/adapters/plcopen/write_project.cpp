@@ -103,7 +103,7 @@ class Declared {
     xml_node variable = add(list, "variable", name);
     if (member.variable != nullptr && !member.variable->address.empty())
       set(variable, "address", member.variable->address);
-    xml_node type = variable.append_child("type");
+    const xml_node type = variable.append_child("type");
     if (member.members.empty()) {
       add_type(type, member.variable->type);
     } else {
@@ -120,20 +120,21 @@ class Declared {
 };
 
 void Declared::add_sections(xml_node parent, const char* section, const std::vector<Member>& members) {
-  struct Kind {
+  struct SectionKind {
     const char* attribute;
     bool retain, constant;
   };
-  constexpr std::array<Kind, 3> kKinds{{{.attribute = nullptr, .retain = false, .constant = false},
-                                        {.attribute = "retain", .retain = true, .constant = false},
-                                        {.attribute = "constant", .retain = false, .constant = true}}};
-  const auto belongs = [](const Member& member, const Kind& kind) {
+  constexpr std::array<SectionKind, 3> kSectionKinds{
+      {{.attribute = nullptr, .retain = false, .constant = false},
+       {.attribute = "retain", .retain = true, .constant = false},
+       {.attribute = "constant", .retain = false, .constant = true}}};
+  const auto belongs = [](const Member& member, const SectionKind& kind) {
     const bool constant = member.variable != nullptr && member.variable->constant;
     const bool retain = member.variable != nullptr && member.variable->retain && !constant;
     return constant == kind.constant && retain == kind.retain;
   };
   Names names;
-  for (const Kind& kind : kKinds) {
+  for (const SectionKind& kind : kSectionKinds) {
     xml_node list;
     for (const Member& member : members) {
       if (!belongs(member, kind)) continue;
@@ -149,7 +150,7 @@ void Declared::add_sections(xml_node parent, const char* section, const std::vec
 class Writer {
  public:
   std::string write(const ExportedPlant& plant) {
-    xml_node declaration = document_.append_child(pugi::node_declaration);
+    const xml_node declaration = document_.append_child(pugi::node_declaration);
     set(declaration, "version", "1.0");
     set(declaration, "encoding", "utf-8");
     xml_node project = document_.append_child("project");
@@ -157,7 +158,7 @@ class Writer {
     set(project, "xmlns:xhtml", "http://www.w3.org/1999/xhtml");
     add_headers(project, plant);
     declared_.begin(project.append_child("types"));
-    xml_node configurations = project.append_child("instances").append_child("configurations");
+    const xml_node configurations = project.append_child("instances").append_child("configurations");
     Names names;
     for (const ExportedHost& host : plant.hosts) add_host(configurations, host, names.of(host.name));
     std::ostringstream stream;
@@ -167,7 +168,7 @@ class Writer {
 
  private:
   static void add_headers(xml_node project, const ExportedPlant& plant) {
-    xml_node file = project.append_child("fileHeader");
+    const xml_node file = project.append_child("fileHeader");
     set(file, "companyName", "plchost");
     set(file, "productName", "plchost");
     set(file, "productVersion", plant.product_version);
@@ -175,13 +176,13 @@ class Writer {
     xml_node content = add(project, "contentHeader", "plant");
     xml_node coordinates = content.append_child("coordinateInfo");
     for (const char* const language : {"fbd", "ld", "sfc"}) {
-      xml_node scaling = coordinates.append_child(language).append_child("scaling");
+      const xml_node scaling = coordinates.append_child(language).append_child("scaling");
       set(scaling, "x", "1");
       set(scaling, "y", "1");
     }
   }
   void add_host(xml_node parent, const ExportedHost& host, const std::string& name) {
-    xml_node configuration = add(parent, "configuration", name);
+    const xml_node configuration = add(parent, "configuration", name);
     Names names;
     for (const ExportedInstance& instance : host.instances)
       add_instance(configuration, instance, names.of(instance.name));
@@ -189,7 +190,7 @@ class Writer {
   }
 
   void add_instance(xml_node parent, const ExportedInstance& instance, const std::string& name) {
-    xml_node resource = add(parent, "resource", name);
+    const xml_node resource = add(parent, "resource", name);
     std::vector<Member> members = tree_of(instance.variables);
     std::map<std::string, std::string> types;  // of the programs, as they are written
     for (const ExportedProgram& program : instance.programs) {
@@ -223,7 +224,7 @@ class Writer {
         });
     if (stands_for_program) return;
     const std::string name = names.of(task.name);
-    xml_node element = add(resource, "task", name);
+    const xml_node element = add(resource, "task", name);
     if (task.kind == Kind::cyclic) set(element, "interval", time_literal(task.interval_ns));
     if (task.kind == Kind::event && !task.event.empty()) set(element, "single", task.event);
     set(element, "priority", std::to_string(task.priority));
@@ -241,7 +242,7 @@ class Writer {
   static void add_program(xml_node parent, const ExportedProgram& program,
                           const std::map<std::string, std::string>& types, Names& names) {
     const std::string name = names.of(program.name);
-    xml_node element = add(parent, "pouInstance", name);
+    const xml_node element = add(parent, "pouInstance", name);
     set(element, "typeName", types.at(program.name));
     document(element, told_name(program.name, name));
   }
