@@ -158,7 +158,7 @@ TEST_F(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
   constexpr int kMotor = 1, kFault = 2;
   put(kEnable, 300);
   EXPECT_TRUE(eventually([&] { return (outputs()[0] & kMotor) != 0 && word(1) == 300; }));
-  PoolEvent product = sut->event("product");
+  const PoolEvent product = sut->event("product");
   for (int i = 0; i < 25; ++i) EXPECT_EQ(product.post(), PostResult::posted);
   EXPECT_TRUE(eventually([&] { return word(2) == 25 && word(3) == 2; }));
   put(kEnable | kStop, 300);

@@ -286,7 +286,7 @@ TEST(PlcopenXml, StaysWithinItsBounds) {
   const auto nested = [](int depth) {
     std::string type = "<INT/>";
     for (int i = 0; i < depth; ++i)
-      type = "<array><dimension lower='1' upper='2'/><baseType>" + type + "</baseType></array>";
+      type = fmt::format("<array><dimension lower='1' upper='2'/><baseType>{}</baseType></array>", type);
     return problems_of(project(in_pou("<localVars>" + variable(type) + "</localVars>")));
   };
   EXPECT_THAT(nested(kMostDepth), IsEmpty());
