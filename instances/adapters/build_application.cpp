@@ -24,6 +24,7 @@
 #include "instances/adapters/matiec/located.hpp"
 #include "instances/adapters/matiec/task_plan.hpp"
 #include "instances/adapters/output_file.hpp"
+#include "instances/adapters/plcopen/structured_text.hpp"
 #include "instances/adapters/run_program.hpp"
 #include "instances/adapters/text_files.hpp"
 #include "instances/adapters/work_folder.hpp"
@@ -64,6 +65,7 @@ class Build {
       for (const iec::Resource& resource : configuration().resources) make(resource);
       if (report_.problems.empty()) publish();
     }
+    projects_.restore(report_.problems, report_.remarks);
     return std::move(report_);
   }
 
@@ -149,7 +151,9 @@ class Build {
   void read_source(const std::string& file) {
     auto read = read_text_file(file, kMaxSource);
     if (!has(read)) return;
-    sources_.push_back({file, std::move(read->text)});
+    iec::Source source{file, std::move(read->text)};
+    if (plcopen::is_project_file(file)) source = projects_.take(source, report_.problems);
+    sources_.push_back(std::move(source));
     identities_.push_back(read->identity);
   }
 
@@ -289,6 +293,7 @@ class Build {
   const BuildOrder& order_;
   std::optional<WorkFolder> work_;
   std::vector<iec::Source> sources_;
+  plcopen::ProjectSources projects_;      // those that are PLCopen XML
   std::vector<FileIdentity> identities_;  // of all files that are read
   iec::Project project_;
   matiec::Compiler compiler_;

@@ -12,7 +12,7 @@ namespace plchost {
 
 /// The order to `plcctl build application`.
 struct BuildOrder {
-  std::vector<std::string> sources;  ///< files, and folders whose *.st are meant
+  std::vector<std::string> sources;  ///< files (ST, or PLCopen XML), and folders whose *.st are meant
   std::string tasks = {};            ///< task file; empty: X.toml beside a single source X.st, if it is there
   std::string output;         ///< the application: line.so. Of several resources each has its name in it
   std::string matiec;         ///< folder of the compiler; empty: PLCHOST_MATIEC, PATH
