@@ -72,6 +72,7 @@ class AreasUnderTest : public ::testing::Test {
     auto placed = place_only(settings);
     if (!placed) return placed;
     PLCHOST_TRY(sut.keep());
+    sut.outputs().arm();
     return placed;
   }
   /// As a start does of which a later step may fail.
