@@ -90,14 +90,14 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 /* The layout: this, then PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS slots, each a plc_image_slot and the bytes,
  * padded to 64. All zero but for the first four is an image into which nothing was written yet. */
 typedef struct {
-  plc_image_u64 magic;   /* written last, by the maker of the image */
-  unsigned int version;  /* PLC_IMAGE_VERSION */
-  unsigned int slots;    /* PLC_IMAGE_SLOTS */
-  plc_image_u64 size;    /* bytes of one image */
-  plc_image_u64 control; /* the dead-man word */
-  plc_image_u64 safe;    /* sequence of the safe image * 256 + its slot; 0: none */
-  plc_image_u64 on_end;  /* 1: the safe image is shown when the writer has ended; 0: what is shown stays */
-  plc_image_u64 writer;  /* its process number */
+  plc_image_u64 magic;        /* written last, by the maker of the image */
+  unsigned int version;       /* PLC_IMAGE_VERSION */
+  unsigned int slots;         /* PLC_IMAGE_SLOTS */
+  plc_image_u64 size;         /* bytes of one image */
+  plc_image_u64 control;      /* the dead-man word */
+  plc_image_u64 safe;         /* sequence of the safe image * 256 + its slot; 0: none */
+  plc_image_u64 on_end;       /* 1: the safe image is shown when the writer has ended; 0: no change */
+  plc_image_u64 writer;       /* its process number */
   plc_image_i64 heartbeat_ns; /* CLOCK_MONOTONIC, its last sign */
   plc_image_u64 latest;       /* sequence of the latest image * 256 + its slot; 0: none yet */
   plc_image_u64 reserved[7];

@@ -49,8 +49,8 @@ class OutputsPage {
 [[nodiscard]] std::string outputs_page_name(std::string_view pool, std::string_view instance);
 
 /// Puts the outputs of an instance whose process has ended into their safe state, and removes its page. If
-/// there is none, the process has done so itself, or has no outputs; while it runs, nothing is done. What
-/// cannot be put there is logged. Takes microseconds for images. Set-up.
+/// there is none, the process has done so itself, or has no outputs; while it runs, nothing is done.
+/// Outputs that cannot be put there are logged. Takes microseconds for images. Set-up.
 void end_outputs(std::string_view pool, std::string_view instance);
 
 }  // namespace plchost

@@ -12,10 +12,8 @@ using Image = std::array<plc_image_u64, 2>;
 constexpr unsigned kSize = sizeof(Image);
 
 struct Shared {
-  alignas(64)
-      std::array<char, sizeof(plc_image_header) +
-                           (PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) * (sizeof(plc_image_slot) + 64)>
-          bytes{};
+  alignas(64) std::array<char, sizeof(plc_image_header) + (PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) *
+                                                              (sizeof(plc_image_slot) + 64)> bytes{};
   plc_image image{};
 
   Shared() {
@@ -137,8 +135,7 @@ void a_safe_image_is_told(Scene& scene) {
     shared.set_safe(kSafe);
     (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
   });
-  scene.thread("terminal",
-               [&] { require(shared.read() != 0, "no safe image, although it is told"); });
+  scene.thread("terminal", [&] { require(shared.read() != 0, "no safe image, although it is told"); });
 }
 
 // The last image that was published becomes the safe one. A writer that is killed meanwhile leaves the one or

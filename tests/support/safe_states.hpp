@@ -38,7 +38,8 @@ inline std::string settings_of(const SafeCase& one, const std::string& device = 
       "Linux.Area.0.SafeState=" +
       setting + "\n";
   if (device.empty()) return text;
-  return text + "Linux.Area.1.Flags=0x8000\nLinux.Area.1.Address=0\nLinux.Area.1.Size=8\nLinux.Area.1.Device=" +
+  return text +
+         "Linux.Area.1.Flags=0x8000\nLinux.Area.1.Address=0\nLinux.Area.1.Size=8\nLinux.Area.1.Device=" +
          device + "\nLinux.Area.1.SafeState=" + (setting.starts_with("0x") ? "0xE5E5E5E5E5E5E5E5" : setting) +
          "\n";
 }

@@ -297,7 +297,7 @@ void Instance::report_tick() {
 }
 
 void Instance::beat() {
-  // First: what follows may wait for a lock that a task which was caught holds.
+  // First: the rest may wait for a lock of the heap, which a task that was caught can hold.
   host_->areas().outputs().beat([this](std::size_t index) {
     const Task& task = tasks_->task(index);
     return task.in_cycle() && !task.trap().parked();

@@ -83,7 +83,7 @@ class Areas {
   [[nodiscard]] std::string retain_problem() const { return keeper_ ? keeper_->problem() : std::string(); }
 
   /// Of these areas, all that a terminal can see.
-  [[nodiscard]] SafeOutputs& outputs() noexcept { return safe_outputs_; }
+  [[nodiscard]] SafeOutputs& outputs() noexcept { return *safe_outputs_; }
   /// The end of the process: the outputs are safe, and nobody else has to put them there. Control thread.
   void end_outputs() noexcept;
 
@@ -155,7 +155,7 @@ class Areas {
   std::deque<Of<OutputView>> outputs_;
   std::vector<std::size_t> output_tasks_;  // of each of them
   std::optional<OutputsPage> outputs_page_;
-  SafeOutputs safe_outputs_;
+  std::unique_ptr<SafeOutputs> safe_outputs_ = std::make_unique<SafeOutputs>();
   std::deque<TaskCycle> cycles_;   // of each task
   std::vector<std::byte*> plain_;  // addresses of areas that are the same for all
 };

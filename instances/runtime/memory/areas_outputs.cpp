@@ -97,11 +97,11 @@ void Areas::make_safe_outputs() {
     }
     blocks.push_back(std::move(block));
   }
-  safe_outputs_.make(std::move(blocks), tasks_.size());
+  safe_outputs_->make(std::move(blocks), tasks_.size());
 }
 
 void Areas::end_outputs() noexcept {
-  safe_outputs_.put_safe(PLC_IMAGE_STATE_ENDED);
+  safe_outputs_->put_safe(PLC_IMAGE_STATE_ENDED);
   outputs_page_.reset();
 }
 

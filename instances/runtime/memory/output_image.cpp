@@ -43,7 +43,7 @@ void OutputImage::put_safe(unsigned state) noexcept {
     plc_image_set_safe(&image_, shown_.data());
     have = true;
   }
-  // What cannot be read, because a stranger has spoiled it, cannot be kept either.
+  // An image that cannot be read, because a stranger has spoiled it, cannot be kept either.
   (void)plc_image_tell(&image_, state, have ? 1 : 0);
 }
 
@@ -68,7 +68,7 @@ bool OutputImage::put_into(std::span<const std::byte> from, std::span<const Byte
          });
 }
 
-// What others have told meanwhile stays: a fault, say.
+// A state that another one has told meanwhile stays: a fault, say.
 void OutputImage::resume(std::uint64_t told) noexcept {
   plc_image_resume(&image_, told);
   told_.compare_exchange_strong(told, 0, std::memory_order_relaxed);

@@ -34,7 +34,7 @@ class OutputImage {
   /// `initial`. Set-up, once.
   void begin(std::span<const std::byte> initial, std::span<const std::byte> safe);
   /// From now on readers are shown the safe image, or the last one that was published if they are to keep
-  /// that. Whatever tasks publish afterwards is not shown. Control thread.
+  /// that. Later publications are not shown. Control thread.
   void put_safe(unsigned state) noexcept;
   /// Of put_safe() the part that needs nothing but atomic operations. To be followed by that. Any context,
   /// signal handlers included.
@@ -92,7 +92,7 @@ class OutputImage {
   }
 
   plc_image image_;
-  std::vector<std::byte> safe_;   // empty: what was put out last is kept
+  std::vector<std::byte> safe_;   // empty: the last values are kept
   std::vector<std::byte> shown_;  // of the control thread
   std::vector<std::byte> scratch_;
   std::atomic<std::uint64_t> told_{0};     // the dead-man word that the next publication ends; 0: none

@@ -24,7 +24,7 @@ namespace plchost {
 //   the
 //           safe values, until that task has come to the end of its first cycle.
 //
-// An image keeps what the tasks put out last, and the safe values beside it: a task goes on with its own
+// An image keeps what the tasks put out last, and the safe values beside it. So a task goes on with its own
 // values. put_safe() changes what is shown, so nothing that a task publishes later is seen. Registers are
 // written over; a task that is just writing them when they are made safe is written over once more.
 

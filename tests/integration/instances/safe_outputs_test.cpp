@@ -85,7 +85,8 @@ TEST_P(SafeOutputsOf, AStoppedApplicationAreSafeUntilItsNextFirstCycle) {
   expect_safe(PLC_IMAGE_STATE_STOPPED);
   EXPECT_EQ(sut->end(SIGTERM), 0);
   expect_safe(PLC_IMAGE_STATE_ENDED);
-  EXPECT_FALSE(MemoryFile::open(outputs_page_name(sandbox.pool(), "line1"), 1, MemoryFile::Access::read_only));
+  EXPECT_FALSE(
+      MemoryFile::open(outputs_page_name(sandbox.pool(), "line1"), 1, MemoryFile::Access::read_only));
 }
 
 TEST_P(SafeOutputsOf, AnApplicationAreSafeAfterAFault) {

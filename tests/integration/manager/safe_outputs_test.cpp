@@ -42,9 +42,9 @@ class SafeOutputsUnderAManager : public ::testing::TestWithParam<SafeCase> {
         Plant::eventually([&] { return shows(PLC_IMAGE_STATE_RUNNING, kDriven, 0x5555555555555555); }));
   }
   void expect_ended() const {
-    EXPECT_TRUE(Plant::eventually(
-        [&] { return shows(PLC_IMAGE_STATE_ENDED, GetParam().shown, GetParam().registers); }))
-        << plant.log();
+    EXPECT_TRUE(Plant::eventually([&] {
+      return shows(PLC_IMAGE_STATE_ENDED, GetParam().shown, GetParam().registers);
+    })) << plant.log();
   }
   void kill_instance() {
     const auto process = open_process(plant.status("line1").pid);

@@ -36,8 +36,8 @@ void setup(plc::Application& app) {
   app.external("Loop", 13, "loop", [] {
     for (;;) sink = sink + 1;
   });
-  outputs = app.area<Outputs>("outputs", PLC_AREA_OUTPUT, {},
-                              {{{"Fast", 0, 4}, {"Slow", 4, 4}, {"Valve", 8, 4}}});
+  outputs =
+      app.area<Outputs>("outputs", PLC_AREA_OUTPUT, {}, {{{"Fast", 0, 4}, {"Slow", 4, 4}, {"Valve", 8, 4}}});
   registers = app.area<std::uint64_t>("registers", PLC_AREA_OUTPUT | 0x8000, {}, {{{"Fast", 0, 8}}});
 }
 
