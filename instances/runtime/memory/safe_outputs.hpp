@@ -20,9 +20,8 @@ namespace plchost {
 //
 //   safe    Terminals are shown the safe values: zeros, given ones, or those that were put out last.
 //   armed   The tasks are started. Terminals are still shown the safe values.
-//   driven  Terminals are shown what the tasks put out. Of bytes that one task alone writes they are shown
-//   the
-//           safe values, until that task has come to the end of its first cycle.
+//   driven  Terminals are shown what the tasks put out. Bytes that one task alone writes follow with the end
+//           of its own first cycle.
 //
 // An image keeps what the tasks put out last, and the safe values beside it. So a task goes on with its own
 // values. put_safe() changes what is shown, so nothing that a task publishes later is seen. Registers are
