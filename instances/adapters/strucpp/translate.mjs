@@ -30,6 +30,25 @@ function message(found) {
   return { place: place(found.file ?? sources[0].name, found.line, found.column), text };
 }
 
+// A POU of the program and one of a library with the same name would both go into the C++. That of the program counts.
+function libraries() {
+  const own = new Set();
+  for (const { text } of sources) {
+    const plain = text.replace(/\(\*[\s\S]*?\*\)|\/\*[\s\S]*?\*\/|\/\/[^\n]*/g, ' ');
+    for (const [, name] of plain.matchAll(/^\s*FUNCTION(?:_BLOCK)?\s+(?:ABSTRACT\s+|FINAL\s+)*(\w+)/gim)) own.add(name.toUpperCase());
+  }
+  const isOfLibrary = (one) => !own.has(one.name.toUpperCase());
+  return discoverStlibs(join(folder, 'libs')).map((archive) => ({
+    ...archive,
+    chunks: archive.chunks?.filter(isOfLibrary),
+    manifest: {
+      ...archive.manifest,
+      functions: archive.manifest.functions.filter(isOfLibrary),
+      functionBlocks: archive.manifest.functionBlocks.filter(isOfLibrary),
+    },
+  }));
+}
+
 function translate() {
   const [first, ...others] = sources;
   try {
@@ -40,7 +59,7 @@ function translate() {
       optimizationLevel: 0,
       fileName: first.name,
       additionalSources: others.map((other) => ({ source: other.text, fileName: other.name })),
-      libraries: discoverStlibs(join(folder, 'libs')),
+      libraries: libraries(),
     });
   } catch (error) {
     // The compiler throws for what it does not support, without a place.
