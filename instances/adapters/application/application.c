@@ -1,12 +1,12 @@
 /*
- * An application for plchost of what iec2c has made of a program. The runtime sees only plc_app.h.
+ * An application for plchost of what a compiler has made of a program. The runtime sees only plc_app.h.
  */
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 #include "plc_app.h"
-#include "plchost_matiec.h"
+#include "plchost_adapter.h"
 
 PLC_EXPORT_ABI;
 
@@ -14,7 +14,7 @@ static Task_Info* infos;
 
 /* The clock of IEC's timers: that of the cycle's begin, for each task its own. */
 static struct timespec* now;
-struct timespec* plchost_now(void);
+struct timespec* plchost_now(void); /* which the library of a compiler declares in its own way */
 struct timespec* plchost_now(void) {
   const Task_Info* const current = plc_current_task();
   return &now[current == NULL ? 0 : current - infos];
@@ -78,7 +78,6 @@ int CDECL plc_app_init(void) {
   infos = calloc(plchost_task_count, sizeof *infos);
   now = calloc(plchost_task_count, sizeof *now);
   if (infos == NULL || now == NULL) return 1;
-  config_init__();
   plchost_bind();
   if (!plchost_declare_places() || !plchost_declare_variables()) return 1;
   for (i = 0; i < plchost_task_count; ++i) fill(&infos[i], &plchost_tasks[i]);

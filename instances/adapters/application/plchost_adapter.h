@@ -1,11 +1,15 @@
 /*
- * Between the C files of an application that iec2c has translated: the one that `plcctl build application`
- * writes, in which the program and its types are, and those that know the runtime: application.c, places.c
- * and variables.c. All names are in lower case: those of the program are in upper case, so none of them can
- * be the same.
+ * Between the files of an application that a compiler for IEC 61131-3 has translated: the one that `plcctl
+ * build application` writes, in C or C++, in which the program and its types are, and those that know the
+ * runtime: application.c, places.c and variables.c. All names are in lower case: those of the program are in
+ * upper case, so none of them can be the same.
  */
-#ifndef PLCHOST_MATIEC_H
-#define PLCHOST_MATIEC_H
+#ifndef PLCHOST_ADAPTER_H
+#define PLCHOST_ADAPTER_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* A located variable. Its value lies where the program has it, its bytes or its bit lie in an area. */
 struct plchost_place {
@@ -68,8 +72,7 @@ extern const unsigned int plchost_place_count;
 extern const struct plchost_place plchost_places[];
 extern unsigned long long plchost_exchanged[]; /* for each place, not in the inputs */
 void plchost_each_variable(void (*use)(const struct plchost_variable*));
-void plchost_bind(void); /* after config_init__() */
-void config_init__(void);
+void plchost_bind(void); /* makes the program ready for its first cycle */
 
 /* From application.c: around each cycle of a task. */
 void plchost_begin(unsigned int task);
@@ -87,5 +90,9 @@ unsigned char plchost_bit_now(unsigned int place);
 int plchost_declare_variables(void);
 void plchost_forget_variables(void);
 void plchost_keep_retained(const struct plchost_task* task);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

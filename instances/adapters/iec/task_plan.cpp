@@ -1,4 +1,4 @@
-#include "instances/adapters/matiec/task_plan.hpp"
+#include "instances/adapters/iec/task_plan.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,11 +12,9 @@
 #include "instances/adapters/iec/tokens.hpp"
 #include "shm/base/names.hpp"
 
-namespace plchost::matiec {
+namespace plchost::iec {
 
 namespace {
-
-using iec::folded;
 
 constexpr int kLowestPriority = 31;
 constexpr int kLastRealTimePriority = 15;
@@ -31,18 +29,19 @@ bool is_interval(std::int64_t ns) noexcept {
   return ns % kMicrosecond == 0 && ns / unit <= std::numeric_limits<unsigned int>::max();
 }
 
-std::string_view kind_of(const iec::Pou& pou) noexcept {
-  return pou.kind == iec::Pou::Kind::function_block ? "FUNCTION_BLOCK" : "FUNCTION";
+std::string_view kind_of(const Pou& pou) noexcept {
+  return pou.kind == Pou::Kind::function_block ? "FUNCTION_BLOCK" : "FUNCTION";
 }
 
 class Planner {
  public:
-  Planner(const iec::Project& project, const iec::Configuration& configuration, const iec::Resource& resource)
-      : project_(project), configuration_(configuration), resource_(resource) {
+  Planner(const Project& project, const Configuration& configuration, const Resource& resource,
+          Compiler compiler)
+      : project_(project), configuration_(configuration), resource_(resource), compiler_(compiler) {
     for (const auto* const globals : {&configuration.globals, &resource.globals}) {
-      for (const iec::Variable& variable : *globals) plan_.globals[folded(variable.name)] = &variable;
+      for (const Variable& variable : *globals) plan_.globals[folded(variable.name)] = &variable;
     }
-    for (const iec::Program& program : resource.programs) {
+    for (const Program& program : resource.programs) {
       if (!program.task.empty()) programs_[folded(program.task)].push_back(&program);
     }
     is_first_ = &resource == configuration.resources.data();
@@ -50,16 +49,20 @@ class Planner {
 
   TaskPlan plan() {
     find_located();
-    for (const iec::Task& task : resource_.tasks) add(task);
-    for (const iec::Program& program : resource_.programs) {
+    for (const Task& task : resource_.tasks) add(task);
+    for (const Program& program : resource_.programs) {
       if (program.connected) refuse_connection(program);
       if (program.task.empty()) add_freewheeling(program);
     }
     for (PlannedTask& task : plan_.tasks) find_uses(task);
     for (const PlannedTask& task : plan_.tasks) check(task);
-    check_period();
     check_areas();
-    check_names();
+    if (compiler_ == Compiler::matiec) {
+      check_period();
+      check_names();
+    } else {
+      check_instances();
+    }
     name_shared_globals();
     name_shared_places();
     name_separate_globals();
@@ -71,7 +74,7 @@ class Planner {
   }
 
  private:
-  void add(const iec::Task& task) {
+  void add(const Task& task) {
     PlannedTask planned{.name = task.name,
                         .priority = task.priority,
                         .interval_ns = task.interval_ns.value_or(0),
@@ -113,7 +116,7 @@ class Planner {
     task.interval_ns = 0;
     task.single.clear();
   }
-  void add_freewheeling(const iec::Program& program) {
+  void add_freewheeling(const Program& program) {
     plan_.tasks.push_back({.name = program.name,
                            .priority = kLowestPriority,
                            .interval_ns = 0,
@@ -129,38 +132,42 @@ class Planner {
     plan_.remarks.push_back({program.place, fmt::format("PROGRAM {} has no TASK: {}, with priority {}",
                                                         program.name, runs, kLowestPriority)});
   }
-  void refuse_connection(const iec::Program& program) {
+  [[nodiscard]] std::string_view compiler() const {
+    return compiler_ == Compiler::matiec ? "iec2c" : "STruC++";
+  }
+  void refuse_connection(const Program& program) {
     plan_.problems.push_back(
-        {program.place, fmt::format("PROGRAM {}: iec2c cannot translate connections in parentheses; "
+        {program.place, fmt::format("PROGRAM {}: {} cannot translate connections in parentheses; "
                                     "use VAR_EXTERNAL in {}",
-                                    program.name, program.type)});
+                                    program.name, compiler(), program.type)});
   }
 
   // Of the whole project, as iec2c translates also what no task runs. Each of its resources finds the same.
   void find_located() {
-    for (const iec::Pou& pou : project_.pous) {
-      for (const iec::Variable& variable : pou.variables) add_located(variable, &pou);
+    for (const Pou& pou : project_.pous) {
+      for (const Variable& variable : pou.variables) add_located(variable, &pou);
     }
-    for (const iec::Variable& variable : configuration_.globals) add_located(variable, nullptr);
-    for (const iec::Resource& resource : configuration_.resources) {
-      for (const iec::Variable& variable : resource.globals) add_located(variable, nullptr);
+    for (const Variable& variable : configuration_.globals) add_located(variable, nullptr);
+    for (const Resource& resource : configuration_.resources) {
+      for (const Variable& variable : resource.globals) add_located(variable, nullptr);
     }
   }
-  void add_located(const iec::Variable& variable, const iec::Pou* pou) {
+  void add_located(const Variable& variable, const Pou* pou) {
     if (variable.location.empty()) return;
     const auto place = place_of(variable.location);
     if (place) plan_.located[*place].push_back(&variable);
     if (!is_first_) return;
     const auto wrong = [&](std::string text) { plan_.problems.push_back({variable.place, std::move(text)}); };
-    if (pou != nullptr && pou->kind != iec::Pou::Kind::program)
+    if (pou != nullptr && pou->kind != Pou::Kind::program)
       return wrong(
-          fmt::format("{} at {} in a {}: iec2c allows located variables only in a PROGRAM and in "
+          fmt::format("{} at {} in a {}: {} allows located variables only in a PROGRAM and in "
                       "VAR_GLOBAL",
-                      variable.name, variable.location, kind_of(*pou)));
+                      variable.name, variable.location, kind_of(*pou), compiler()));
     if (!place) return wrong(place.error());
     const std::string type = folded(variable.type);
     if (bytes_of_type(type) != place->bytes || (place->bit >= 0) != (type == "BOOL"))
       return wrong(fmt::format("{} does not fit into {}", variable.type, variable.location));
+    if (compiler_ != Compiler::matiec) return;
     // iec2c gives them one name in C.
     const auto [other, is_new] = types_.try_emplace(variable.location, type);
     if (!is_new && other->second != type)
@@ -169,7 +176,7 @@ class Planner {
   }
 
   void find_uses(PlannedTask& task) {
-    for (const iec::Program* const program : task.programs) {
+    for (const Program* const program : task.programs) {
       const auto [uses, is_new] = uses_.try_emplace(folded(program->type));
       if (is_new) uses->second = uses_of(program->type);
       task.places.insert(uses->second.places.begin(), uses->second.places.end());
@@ -183,18 +190,18 @@ class Planner {
   // Of a program and of the function blocks in it.
   Uses uses_of(const std::string& program) {
     Uses uses;
-    std::set<const iec::Pou*> seen;
-    std::vector<const iec::Pou*> open;
+    std::set<const Pou*> seen;
+    std::vector<const Pou*> open;
     const auto visit = [&](std::string_view type) {
-      const iec::Pou* const pou = project_.pou(type);
+      const Pou* const pou = project_.pou(type);
       if (pou != nullptr && seen.insert(pou).second) open.push_back(pou);
     };
     visit(program);
     while (!open.empty()) {
-      const iec::Pou* const pou = open.back();
+      const Pou* const pou = open.back();
       open.pop_back();
-      for (const iec::Variable& variable : pou->variables) {
-        if (variable.section == iec::Variable::Section::external) {
+      for (const Variable& variable : pou->variables) {
+        if (variable.section == Variable::Section::external) {
           use_global(folded(variable.name), uses);
         } else {
           use_place(variable, uses);
@@ -210,7 +217,7 @@ class Planner {
     uses.globals.insert(name);
     use_place(*global->second, uses);
   }
-  static void use_place(const iec::Variable& variable, Uses& uses) {
+  static void use_place(const Variable& variable, Uses& uses) {
     if (variable.location.empty()) return;
     if (const auto place = place_of(variable.location)) uses.places.insert(*place);
   }
@@ -231,9 +238,9 @@ class Planner {
   // iec2c needs a tick, though no task of plchost runs by it.
   void check_period() {
     if (!is_first_) return;
-    const bool has_period = std::ranges::any_of(configuration_.resources, [](const iec::Resource& resource) {
+    const bool has_period = std::ranges::any_of(configuration_.resources, [](const Resource& resource) {
       return std::ranges::any_of(resource.tasks,
-                                 [](const iec::Task& task) { return task.interval_ns.has_value(); });
+                                 [](const Task& task) { return task.interval_ns.has_value(); });
     });
     if (has_period) return;
     plan_.problems.push_back(
@@ -258,9 +265,9 @@ class Planner {
   // case.
   void check_names() {
     std::map<std::string, std::string> taken;
-    for (const iec::Pou& pou : project_.pous) taken[folded(pou.name)] = "a POU";
-    for (const iec::DeclaredType& type : project_.types) taken[folded(type.name)] = "a TYPE";
-    const auto take = [&](const std::string& name, const iec::SourcePlace& place, const char* what) {
+    for (const Pou& pou : project_.pous) taken[folded(pou.name)] = "a POU";
+    for (const DeclaredType& type : project_.types) taken[folded(type.name)] = "a TYPE";
+    const auto take = [&](const std::string& name, const SourcePlace& place, const char* what) {
       const auto [entry, is_new] = taken.try_emplace(folded(name), what);
       if (is_new) return;
       plan_.problems.push_back(
@@ -268,9 +275,24 @@ class Planner {
                       "'{}' is the name of {}, too: iec2c cannot tell them apart; call one of them otherwise",
                       name, entry->second)});
     };
-    for (const iec::Task& task : resource_.tasks) take(task.name, task.place, "a TASK");
-    for (const iec::Program& program : resource_.programs) {
+    for (const Task& task : resource_.tasks) take(task.name, task.place, "a TASK");
+    for (const Program& program : resource_.programs) {
       take(program.name, program.place, "an instance of a PROGRAM");
+    }
+  }
+
+  // In the C++ of STruC++ the instances of all resources are members of one class.
+  void check_instances() {
+    if (!is_first_) return;
+    std::set<std::string> taken;
+    for (const Resource& resource : configuration_.resources) {
+      for (const Program& program : resource.programs) {
+        if (taken.insert(folded(program.name)).second) continue;
+        plan_.problems.push_back(
+            {program.place, fmt::format("PROGRAM {}: STruC++ wants another name for each instance of the "
+                                        "CONFIGURATION, and there is one of this name",
+                                        program.name)});
+      }
     }
   }
 
@@ -286,8 +308,11 @@ class Planner {
     const auto place = place_of(location);
     // The memory area is read where it lies.
     if (!place || place->area == 'M') return;
+    // With iec2c all variables of a place are one.
     const bool is_read = std::ranges::any_of(plan_.tasks, [&](const PlannedTask& other) {
-      return other.single.empty() && other.extension.external_event.empty() && other.places.contains(*place);
+      return other.single.empty() && other.extension.external_event.empty() &&
+             (compiler_ == Compiler::matiec ? other.places.contains(*place)
+                                            : other.globals.contains(folded(task.single)));
     });
     if (is_read) return;
     plan_.problems.push_back(
@@ -314,7 +339,7 @@ class Planner {
       for (const std::string& name : task.globals) users[name].push_back(&task);
     }
     for (const auto& [name, tasks] : users) {
-      const iec::Variable& variable = *plan_.globals.at(name);
+      const Variable& variable = *plan_.globals.at(name);
       if (!variable.constant && can_interleave(tasks)) name_shared(variable, tasks);
     }
   }
@@ -325,12 +350,12 @@ class Planner {
       for (const Place& place : task.places) users[place].push_back(&task);
     }
     for (const auto& [place, tasks] : users) {
-      const iec::Variable& variable = *plan_.located.at(place).back();  // a global, if there is one
-      if (place.area == 'I' || variable.section == iec::Variable::Section::global) continue;
+      const Variable& variable = *plan_.located.at(place).back();  // a global, if there is one
+      if (place.area == 'I' || variable.section == Variable::Section::global) continue;
       if (can_interleave(tasks)) name_shared(variable, tasks);
     }
   }
-  void name_shared(const iec::Variable& variable, const Tasks& tasks) {
+  void name_shared(const Variable& variable, const Tasks& tasks) {
     plan_.remarks.push_back(
         {variable.place, fmt::format("the tasks {} use {} and can pre-empt each other: it may "
                                      "change in the middle of a cycle",
@@ -339,8 +364,8 @@ class Planner {
   void name_separate_globals() {
     if (!is_first_ || configuration_.resources.size() < 2) return;
     std::vector<std::string_view> names;
-    const iec::Variable* first = nullptr;
-    for (const iec::Variable& variable : configuration_.globals) {
+    const Variable* first = nullptr;
+    for (const Variable& variable : configuration_.globals) {
       if (variable.constant || !variable.location.empty()) continue;
       if (first == nullptr) first = &variable;
       names.push_back(variable.name);
@@ -355,7 +380,7 @@ class Planner {
 
   void name_retained() {
     for (const auto& [place, variables] : plan_.located) {
-      for (const iec::Variable* const variable : variables) {
+      for (const Variable* const variable : variables) {
         if (!is_first_ || !variable->retain) continue;
         plan_.remarks.push_back(
             {variable->place,
@@ -365,21 +390,22 @@ class Planner {
     }
   }
 
-  const iec::Project& project_;
-  const iec::Configuration& configuration_;
-  const iec::Resource& resource_;
+  const Project& project_;
+  const Configuration& configuration_;
+  const Resource& resource_;
+  Compiler compiler_;
   bool is_first_ = false;  // of the configuration: it says what is wrong outside of the resources
-  std::map<std::string, std::vector<const iec::Program*>> programs_;  // by the folded name of their task
-  std::map<std::string, Uses> uses_;          // by the folded name of a program's type
-  std::map<std::string, std::string> types_;  // of each location
+  std::map<std::string, std::vector<const Program*>> programs_;  // by the folded name of their task
+  std::map<std::string, Uses> uses_;                             // by the folded name of a program's type
+  std::map<std::string, std::string> types_;                     // of each location
   TaskPlan plan_;
 };
 
 }  // namespace
 
-TaskPlan plan_tasks(const iec::Project& project, const iec::Configuration& configuration,
-                    const iec::Resource& resource) {
-  return Planner(project, configuration, resource).plan();
+TaskPlan plan_tasks(const Project& project, const Configuration& configuration, const Resource& resource,
+                    Compiler compiler) {
+  return Planner(project, configuration, resource, compiler).plan();
 }
 
-}  // namespace plchost::matiec
+}  // namespace plchost::iec

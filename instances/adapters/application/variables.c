@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "plc_app.h"
-#include "plchost_matiec.h"
+#include "plchost_adapter.h"
 
 struct retained {
   unsigned char* value;
