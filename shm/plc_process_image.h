@@ -404,10 +404,10 @@ static __inline__ int plc_image_map(plc_image* image) {
 }
 
 /*
- * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno: EINVAL: no name, or size;
- * ENAMETOOLONG; EPROTO: there is another kind of memory, another size, or the version of another header (then
- * remove the file while nobody uses it); EBUSY: it has a writer
- * already; those of open, ftruncate, posix_fallocate and mmap. Set-up.
+ * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno. EINVAL: no name, or size.
+ * ENAMETOOLONG. EPROTO: there is another kind of memory, another size, or the version of another header. Then
+ * remove the file while no program uses it. EBUSY: it has a writer already. Others: those of open, ftruncate,
+ * posix_fallocate and mmap. Set-up.
  */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
                                      plc_image* image) {

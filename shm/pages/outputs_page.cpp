@@ -108,7 +108,7 @@ Result<void> end_image(const std::string& pool, const std::string& name, std::in
 Result<void> write_registers(const OutputEntry& entry, std::span<const std::byte> values) {
   const std::string path(entry.name.view());
   const UniqueFd fd(::open(path.c_str(), O_RDWR | O_SYNC | O_CLOEXEC | O_NONBLOCK));
-  if (!fd) return failure(ErrorCode::system, "open", errno);
+  if (!fd) return failure(ErrorCode::system, "cannot open it", errno);
   struct stat status{};
   if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat", errno);
   const auto file_size = static_cast<std::uint64_t>(status.st_size);

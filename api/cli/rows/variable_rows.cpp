@@ -3,8 +3,8 @@
 namespace plchost {
 
 dds::Computed<plc_VariableRecord, Row> computed_of(const plc_VariableRecord& /*variable*/,
-                                                   std::string_view host, std::string_view instance) {
-  return {.host = host, .instance = instance};
+                                                   const VariableOwner& owner) {
+  return {.host = owner.host, .instance = owner.instance};
 }
 
 }  // namespace plchost

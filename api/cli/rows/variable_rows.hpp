@@ -7,9 +7,14 @@
 
 namespace plchost {
 
+/// The application that declares a variable.
+struct VariableOwner {
+  std::string_view host;
+  std::string_view instance;
+};
+
 /// The fields of the row of a variable that its record has not.
 [[nodiscard]] dds::Computed<plc_VariableRecord, Row> computed_of(const plc_VariableRecord& variable,
-                                                                 std::string_view host,
-                                                                 std::string_view instance);
+                                                                 const VariableOwner& owner);
 
 }  // namespace plchost

@@ -82,9 +82,6 @@ void add(const Command& plcctl, CliSession& session, const Operation& operation)
       return add_for_part(verb, session, operation);
     case OperationArgument::scheduler:
       return add_with_argument(verb, session, operation, "SCHEDULER");
-    case OperationArgument::variable_value:
-    case OperationArgument::variable_or_all:
-      return add_with_argument(verb, session, operation, "VARIABLE");
     case OperationArgument::path:
     case OperationArgument::file:
       return add_with_argument(verb, session, operation, "FILE");

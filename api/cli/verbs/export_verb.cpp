@@ -86,7 +86,7 @@ int export_plant(CliSession& session, const std::vector<std::string>& names, con
   const std::string xml = plcopen::project_of(*plant);
   if (std::fwrite(xml.data(), 1, xml.size(), stdout) == xml.size() && std::fflush(stdout) == 0)
     return kExitDone;
-  return CliSession::fail(failure(ErrorCode::system, "write the plant", errno).error());
+  return CliSession::fail(failure(ErrorCode::system, "cannot write the plant", errno).error());
 }
 
 }  // namespace

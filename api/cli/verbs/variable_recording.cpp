@@ -56,7 +56,7 @@ class Recording {
     fmt::print(file_, "{}\n", line);
     ++samples_;
     if (std::fflush(file_) != 0 || std::ferror(file_) != 0)
-      return failure(ErrorCode::system, "write the recording", errno);
+      return failure(ErrorCode::system, "cannot write the recording", errno);
     return {};
   }
   [[nodiscard]] std::uint64_t samples() const noexcept { return samples_; }

@@ -33,6 +33,10 @@ struct WatchVariablesArguments {
   std::uint64_t count = 0;  // 0: until Ctrl-C
 };
 
+VariableOwner owner_of(const VariableSampler& sampler) {
+  return {.host = sampler.host(), .instance = sampler.instance()};
+}
+
 Result<VariableSampler> sampler_of(CliSession& session, const VariableArguments& arguments,
                                    bool forced = false) {
   PLCHOST_TRY_ASSIGN(auto host, session.target_host());
@@ -47,7 +51,7 @@ int list_variables(CliSession& session, const VariableArguments& arguments) {
   if (!variables) return CliSession::fail(variables.error());
   std::vector<Row> rows;
   for (const plc_VariableRecord& variable : *variables) {
-    rows.push_back(to_row(variable, sampler->host(), sampler->instance()));
+    rows.push_back(to_row(variable, owner_of(*sampler)));
   }
   return session.show(std::move(rows), columns_of<plc_VariableRecord>());
 }
@@ -69,7 +73,7 @@ int read_variables(CliSession& session, const VariableArguments& arguments) {
   }
   std::vector<Row> rows;
   for (const plc_VariableRecord& variable : sample->variables) {
-    rows.push_back(to_row(variable, sampler->host(), sampler->instance()));
+    rows.push_back(to_row(variable, owner_of(*sampler)));
   }
   return session.show(std::move(rows), value_columns());
 }
@@ -126,7 +130,8 @@ int list_forces(CliSession& session, const std::string& instance) {
       VariableSampler sampler(session, host.name, name, {.patterns = {}, .forced = true, .after = 0});
       const auto forced = sampler.all();
       if (!forced) return CliSession::fail(forced.error());
-      for (const plc_VariableRecord& variable : *forced) rows.push_back(to_row(variable, host.name, name));
+      for (const plc_VariableRecord& variable : *forced)
+        rows.push_back(to_row(variable, VariableOwner{host.name, name}));
     }
   }
   if (!known) return CliSession::fail(session.check_instance(instance).error());
@@ -143,7 +148,7 @@ void print_change(const CliSession& session, const VariableSampler& sampler, con
                   const plc_VariableRecord& variable) {
   if (session.options.json) {
     Row row{{"time", time_text(sample.time_unix_ns)}, {"time_unix_ns", sample.time_unix_ns}};
-    row.update(to_row(variable, sampler.host(), sampler.instance()));
+    row.update(to_row(variable, owner_of(sampler)));
     fmt::print("{}\n", json_text(row));
     return;
   }

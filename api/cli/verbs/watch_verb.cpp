@@ -34,7 +34,8 @@ int watch(CliSession& session, const WatchArguments& arguments) {
 
 void add_watch_verb(const Command& plcctl, CliSession& session) {
   const Command verb = plcctl.verb(
-      "watch", "Show changes of state as they come, or look at tasks, one object or variables again and again");
+      "watch",
+      "Show changes of state as they come, or look at tasks, one object or variables again and again");
   const auto arguments = std::make_shared<WatchArguments>();
   constexpr double kMinInterval = 0.1;
   constexpr double kMaxInterval = 3600;

@@ -27,7 +27,7 @@ Error named(Error error, const std::string& instance) {
 
 Result<VariableLister> VariableLister::create(std::string pool, std::string run_directory) {
   PLCHOST_TRY_ASSIGN(const auto epoll,
-                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor"));
+                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "cannot make an epoll descriptor"));
   return VariableLister(std::move(pool), std::move(run_directory), UniqueFd(epoll));
 }
 
@@ -58,7 +58,8 @@ Result<void> VariableLister::connect(const std::string& instance) {
   PLCHOST_TRY_ASSIGN(auto link, ValueLink::connect(run_directory_, instance));
   const int fd = link.fd();
   epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
-  PLCHOST_TRY(check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "watch the values socket"));
+  PLCHOST_TRY(
+      check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "cannot watch the values socket"));
   peers_.emplace(instance, Peer{.link = std::move(link),
                                 .table = std::make_shared<const SymbolTable>(std::move(table))});
   return {};

@@ -25,7 +25,7 @@ struct SelectedVariable {
 /// The part of a table that one page shows.
 struct VariableSelection {
   std::vector<SelectedVariable> rows;
-  std::vector<VariableElement> elements;  ///< whose values the rows need
+  std::vector<VariableElement> elements;  ///< the rows need their values
   bool complete = true;
   std::uint64_t next_after = 0;
 };

@@ -54,7 +54,7 @@ Result<Look> look_at(ClockSystem& system, clockid_t clock, std::string_view name
     int error = system.time(CLOCK_MONOTONIC, before);
     if (error == 0) error = system.time(clock, time);
     if (error == 0) error = system.time(CLOCK_MONOTONIC, after);
-    if (error != 0) return failure(ErrorCode::unavailable, fmt::format("read {}", name), error);
+    if (error != 0) return failure(ErrorCode::unavailable, fmt::format("cannot read {}", name), error);
     const auto reference_ns = nanoseconds_of(time.tv_sec, time.tv_nsec);
     const auto from = nanoseconds_of(before.tv_sec, before.tv_nsec);
     const auto to = nanoseconds_of(after.tv_sec, after.tv_nsec);
@@ -152,7 +152,7 @@ class PtpClock final : public HostClock {
 
   [[nodiscard]] Result<void> ask(unsigned long request, void* argument) {
     const int error = system_.control(device_.get(), request, argument);
-    if (error != 0) return failure(ErrorCode::unavailable, fmt::format("read {}", path_), error);
+    if (error != 0) return failure(ErrorCode::unavailable, fmt::format("cannot read {}", path_), error);
     return {};
   }
 
