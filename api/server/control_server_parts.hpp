@@ -85,6 +85,9 @@ struct ControlServer::Parts {
   [[nodiscard]] bool is_late(const plc_SampleIdentity& identity) const;
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
+  [[nodiscard]] bool collect_findings(FinishedCommand& finished);
+
+  // Lists: control_server_lists.cpp
   void list_objects(const dds::Guid& client, const plc_Request& request);
   void list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request);
   void read_log(const dds::Guid& client, const plc_Request& request);
@@ -92,7 +95,6 @@ struct ControlServer::Parts {
   void tell_variables(std::vector<VariableLister::Finished> finished);
   template <class Page>
   void send_page(const dds::Guid& client, const plc_SampleIdentity& identity, Page& page);
-  [[nodiscard]] bool collect_findings(FinishedCommand& finished);
 
   // Downloads: control_server_downloads.cpp
   void begin_download(const dds::Guid& client, const plc_SampleIdentity& identity, ControlRequest request);

@@ -280,10 +280,8 @@ void define_calls(ClientClass& client) {
       .def("routes", &Client::routes, py::arg("host") = "", py::arg("base") = "",
            "How blocks go from one node to another, or to other hosts.", NoGil())
       .def("variables", &Client::variables, py::arg("host"), py::arg("instance"),
-           py::arg("patterns") = std::vector<std::string>(),
-           "The variables that an application declares, with their values.", NoGil())
-      .def("sample", &Client::sample, py::arg("host"), py::arg("instance"), py::arg("patterns"),
-           "Variables with their values of one moment.", NoGil())
+           py::arg("patterns") = std::vector<std::string>(), NoGil())
+      .def("sample", &Client::sample, py::arg("host"), py::arg("instance"), py::arg("patterns"), NoGil())
       .def("check_host", &Client::check_host, py::arg("host") = "",
            "Has the host looked at anew. Returns the result of each check.", NoGil())
       .def("read_clock", &Client::read_clock, py::arg("host") = "", NoGil())

@@ -18,6 +18,12 @@ Error process_has_ended() {
   return {.code = ErrorCode::unavailable, .system_errno = 0, .message = "its process has ended; ask again"};
 }
 
+Result<SymbolTable> open_table(const std::string& pool, const std::string& instance) {
+  auto table = SymbolTable::open(pool, instance);
+  if (table || table.error().code != ErrorCode::not_found) return table;
+  return failure(ErrorCode::not_found, "it has no application, or one that declares no variables");
+}
+
 Error named(Error error, const std::string& instance) {
   error.message = fmt::format("instance '{}': {}", instance, error.message);
   return error;
@@ -54,7 +60,7 @@ bool VariableLister::is_pending(const plc_SampleIdentity& identity) const {
 // Made at the first list of an instance, and again when its process was another one.
 Result<void> VariableLister::connect(const std::string& instance) {
   if (peers_.contains(instance)) return {};
-  PLCHOST_TRY_ASSIGN(auto table, SymbolTable::open(pool_, instance));
+  PLCHOST_TRY_ASSIGN(auto table, open_table(pool_, instance));
   PLCHOST_TRY_ASSIGN(auto link, ValueLink::connect(run_directory_, instance));
   const int fd = link.fd();
   epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
@@ -120,7 +126,7 @@ Result<void> VariableLister::renew(Pending& pending, std::uint64_t number) {
   }
   const auto peer = peers_.find(pending.asker.instance);
   if (peer == peers_.end()) return std::unexpected(process_has_ended());
-  PLCHOST_TRY_ASSIGN(auto table, SymbolTable::open(pool_, pending.asker.instance));
+  PLCHOST_TRY_ASSIGN(auto table, open_table(pool_, pending.asker.instance));
   peer->second.table = std::make_shared<const SymbolTable>(std::move(table));
   return ask_first(pending, number);
 }

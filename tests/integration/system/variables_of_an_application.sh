@@ -34,7 +34,7 @@ plcctl write variable line1 line.setpoint=40
 follows() { is "$(value line.total)" "$1"; }
 until_true 10 follows 41
 refused "-32768 to 32767" plcctl write variable line1 line.setpoint=40000
-refused "cannot be written" plcctl write variable line1 line.stopped=TRUE
+refused "declared it as read-only" plcctl write variable line1 line.stopped=TRUE
 is "$(value line.setpoint)" 40 || fail "a refused value was written: $(value line.setpoint)"
 
 echo "- forced: the program's own value does not count"
@@ -75,7 +75,7 @@ plcctl reset instance line1
 is "$(forces)" "" || fail "$(plcctl list forces)"
 plcctl start instance line1
 until_true 10 follows 21
-plcctl logs line1 | grep -q 'forced no longer' || fail "$(plcctl logs line1)"
+plcctl logs line1 | grep -q '1 forces end, because' || fail "$(plcctl logs line1)"
 
 echo "- an instance that stands still answers no longer, the others do"
 pid=$(instance line1 pid)
