@@ -66,7 +66,7 @@ std::optional<std::vector<std::string>> BuildContext::words_of(const char* varia
 
 std::vector<std::string> BuildContext::application_files() const {
   const std::string folder = adapters() + "/application/";
-  return {folder + "application.c", folder + "places.c", folder + "variables.c"};
+  return {folder + "application.c", folder + "places.c", folder + "symbols.c", folder + "variables.c"};
 }
 
 }  // namespace plchost

@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include "plc_app.h"
+#include "plc_variables.h"
 #include "plchost_adapter.h"
 
 PLC_EXPORT_ABI;
@@ -23,9 +24,11 @@ struct timespec* plchost_now(void) {
 void plchost_begin(unsigned int number) {
   clock_gettime(CLOCK_MONOTONIC, &now[number]);
   plchost_take_places(&plchost_tasks[number]);
+  plc_apply_forces();
 }
 
 void plchost_end(unsigned int number) {
+  plc_apply_forces();
   plchost_put_places(&plchost_tasks[number]);
   plchost_keep_retained(&plchost_tasks[number]);
 }
@@ -79,7 +82,7 @@ int CDECL plc_app_init(void) {
   now = calloc(plchost_task_count, sizeof *now);
   if (infos == NULL || now == NULL) return 1;
   plchost_bind();
-  if (!plchost_declare_places() || !plchost_declare_variables()) return 1;
+  if (!plchost_declare_places() || !plchost_declare_variables() || !plchost_declare_symbols()) return 1;
   for (i = 0; i < plchost_task_count; ++i) fill(&infos[i], &plchost_tasks[i]);
   setup.nTasks = (short)plchost_task_count;
   strncpy(setup.stApplicationName, plchost_application_name, sizeof setup.stApplicationName - 1);

@@ -1,7 +1,7 @@
 /*
  * Between the files of an application that a compiler for IEC 61131-3 has translated: the one that `plcctl
  * build application` writes, in C or C++, in which the program and its types are, and those that know the
- * runtime: application.c, places.c and variables.c. All names are in lower case: those of the program are in
+ * runtime: application.c, places.c, symbols.c and variables.c. All names are in lower case: those of the program are in
  * upper case, so none of them can be the same.
  */
 #ifndef PLCHOST_ADAPTER_H
@@ -64,6 +64,23 @@ struct plchost_variable {
   int retain;
 };
 
+/* A variable that can be seen from outside, as in plc_variables.h. */
+struct plchost_symbol {
+  const char* name;
+  unsigned int type; /* PLC_TYPE_... */
+  void* value;
+  unsigned int bytes; /* of one element */
+  unsigned int read_only;
+  unsigned int dimensions;
+  struct {
+    int first;
+    unsigned int count;
+    unsigned int stride;
+  } dimension[3];
+  const char* task; /* null: several */
+  const char* area; /* null: it is not located */
+};
+
 /* From the file that plcctl writes. */
 extern const char plchost_application_name[];
 extern const unsigned int plchost_task_count;
@@ -72,6 +89,7 @@ extern const unsigned int plchost_place_count;
 extern const struct plchost_place plchost_places[];
 extern unsigned long long plchost_exchanged[]; /* for each place, not in the inputs */
 void plchost_each_variable(void (*use)(const struct plchost_variable*));
+void plchost_each_symbol(void (*use)(const struct plchost_symbol*));
 void plchost_bind(void); /* makes the program ready for its first cycle */
 
 /* From application.c: around each cycle of a task. */
@@ -85,6 +103,9 @@ void plchost_take_places(const struct plchost_task* task);
 void plchost_put_places(const struct plchost_task* task);
 /* The bit of a place in the memory area as it is now. Any thread. */
 unsigned char plchost_bit_now(unsigned int place);
+
+/* From symbols.c. Returns 0 if that fails. */
+int plchost_declare_symbols(void);
 
 /* From variables.c. */
 int plchost_declare_variables(void);

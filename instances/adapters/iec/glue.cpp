@@ -48,8 +48,13 @@ Glue GlueWriter::write() {
   for (std::size_t i = 0; i < plan_.tasks.size(); ++i) write_task(plan_.tasks[i], i);
   write_tasks();
   write_variables();
+  write_symbols();
   write_binding();
   return {std::move(text_), std::move(plan_.problems), std::move(plan_.remarks)};
+}
+
+void GlueWriter::write_symbols() {
+  print("void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{ (void)use; }}\n");
 }
 
 Place GlueWriter::place_or_none(const Variable& variable) {

@@ -62,6 +62,9 @@ class GlueWriter {
   /// the places that it then does not exchange itself.
   using AddUse = std::function<void(std::size_t, const std::string&)>;
   virtual std::set<Place> write_own_inputs(std::size_t /*task*/, const AddUse& /*add*/) { return {}; }
+  /// The function plchost_each_symbol(): the variables that can be seen from outside. None: the compiler's
+  /// output does not tell where they lie.
+  virtual void write_symbols();
   /// The last function of the file: plchost_bind().
   virtual void write_binding() = 0;
 

@@ -1,10 +1,15 @@
 #include "instances/adapters/matiec/glue.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/matiec/symbols.hpp"
 
 namespace plchost::matiec {
 
@@ -101,6 +106,7 @@ class Writer : public iec::GlueWriter {
         pointers += fmt::format("  {} = &{};\n", located.name, value);
         if (!own.insert(place).second) continue;
         print("static {} {};\n", located.type, value);
+        own_values_[{place, number}] = value;
         add(known->second, value);
       }
       if (pointers.empty()) continue;
@@ -110,13 +116,47 @@ class Writer : public iec::GlueWriter {
     std::erase_if(own, [&](const Place& place) { return shared.contains(place); });
     return own;
   }
+  void write_symbols() override {
+    const auto value_of_place = [this](const Place& place, std::optional<std::size_t> task) -> std::string {
+      if (const auto own = own_values_.find({place, task.value_or(plan().tasks.size())});
+          own != own_values_.end())
+        return own->second;
+      const auto known = numbers_.find(place);
+      return known == numbers_.end() ? "" : places()[known->second].value;
+    };
+    const Symbols symbols = symbols_of(project(), resource(), plan(), value_of_place);
+    std::ranges::copy(symbols.remarks, std::back_inserter(plan().remarks));
+    print(
+        "void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n"
+        "  struct plchost_symbol s = {{0}};\n  (void)use;\n  (void)s;\n");
+    for (const Symbol& symbol : symbols.all) write_symbol(symbol);
+    print("}}\n");
+  }
+  void write_symbol(const Symbol& symbol) {
+    const auto text = [](const std::string& name) {
+      return name.empty() ? "0" : fmt::format("\"{}\"", name);
+    };
+    print(
+        "  s.name = \"{0}\"; s.type = {1}u; s.value = &{2}; s.bytes = sizeof {2}; s.read_only = {3}; s.task "
+        "= {4}; "
+        "s.area = {5}; s.dimensions = {6}u;",
+        symbol.name, symbol.type, symbol.value, symbol.read_only ? 1 : 0, text(symbol.task),
+        text(symbol.area), symbol.dimensions.size());
+    for (std::size_t i = 0; i < symbol.dimensions.size(); ++i) {
+      const Symbol::Dimension& dimension = symbol.dimensions[i];
+      print(" s.dimension[{0}].first = {1}; s.dimension[{0}].count = {2}u; s.dimension[{0}].stride = {3};", i,
+            dimension.first, dimension.count, dimension.stride);
+    }
+    print(" use(&s);\n");
+  }
   void write_binding() override {
     print("void plchost_bind(void) {{\n  config_init__();\n{}}}\n", bindings_);
   }
 
   const std::vector<Located>& located_;
-  std::vector<const Located*> pointers_;  // for each place
-  std::map<Place, std::size_t> numbers_;  // of places
+  std::vector<const Located*> pointers_;                             // for each place
+  std::map<Place, std::size_t> numbers_;                             // of places
+  std::map<std::pair<Place, std::size_t>, std::string> own_values_;  // of inputs, by the number of the task
   std::string bindings_;
 };
 

@@ -75,4 +75,7 @@ const struct plchost_task plchost_tasks[] = {
 void plchost_each_variable(void (*use)(const struct plchost_variable*)) {
   (void)use;
 }
+void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {
+  (void)use;
+}
 void plchost_bind(void) {}
