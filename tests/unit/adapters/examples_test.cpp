@@ -8,7 +8,7 @@
 
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/task_file.hpp"
-#include "instances/adapters/matiec/task_plan.hpp"
+#include "instances/adapters/iec/task_plan.hpp"
 
 namespace plchost {
 namespace {
@@ -18,7 +18,7 @@ using testing::IsEmpty;
 
 struct Example {
   iec::Project project;
-  matiec::TaskPlan plan;
+  iec::TaskPlan plan;
 };
 
 std::string text_of(const std::string& file) {
@@ -38,7 +38,8 @@ void read(const std::string& name, Example& example) {
   iec::Configuration& configuration = example.project.configurations.front();
   ASSERT_THAT(iec::read_task_file({name + ".toml", text_of(file + ".toml")}, configuration), IsEmpty());
   ASSERT_EQ(configuration.resources.size(), 1U);
-  example.plan = matiec::plan_tasks(example.project, configuration, configuration.resources.front());
+  example.plan =
+      iec::plan_tasks(example.project, configuration, configuration.resources.front(), iec::Compiler::matiec);
   ASSERT_THAT(example.plan.problems, IsEmpty());
 }
 

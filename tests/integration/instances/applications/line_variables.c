@@ -1,8 +1,8 @@
 /* Variables of each kind, for those that look at them from outside. */
 #include <string.h>
 
-#include "plc_app.h"
-#include "plc_variables.h"
+#include "instances/plc_app.h"
+#include "instances/plc_variables.h"
 
 PLC_EXPORT_ABI;
 
