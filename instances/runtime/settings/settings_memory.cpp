@@ -79,11 +79,11 @@ std::optional<std::vector<std::byte>> read_hexadecimal(std::string_view text) {
   text.remove_prefix(2);
   if (text.empty() || text.size() % 2 != 0 || text.size() / 2 > kMaxSafeValues) return std::nullopt;
   std::vector<std::byte> bytes;
-  for (; !text.empty(); text.remove_prefix(2)) {
+  for (std::size_t at = 0; at < text.size(); at += 2) {
+    const std::string_view digits = text.substr(at, 2);
     std::uint8_t value = 0;
-    const char* const end = text.data() + 2;
-    const auto read = std::from_chars(text.data(), end, value, 16);
-    if (read.ec != std::errc() || read.ptr != end) return std::nullopt;
+    const auto read = std::from_chars(digits.begin(), digits.end(), value, 16);
+    if (read.ec != std::errc() || read.ptr != digits.end()) return std::nullopt;
     bytes.push_back(std::byte{value});
   }
   return bytes;
