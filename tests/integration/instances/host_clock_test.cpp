@@ -21,8 +21,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr const char* kDevice = "/dev/ptp-of-a-test";
-constexpr std::int64_t kInterval = 2'000'000;
+constexpr const char* kPtpDevice = "/dev/ptp-of-a-test";
+constexpr std::int64_t kPtpInterval = 2'000'000;
 
 class HostClockAsReference : public ::testing::Test {
  protected:
@@ -31,7 +31,7 @@ class HostClockAsReference : public ::testing::Test {
         sandbox_.write("line1.cfg", fmt::format("[DistributedClock]\nReference={}\n{}", reference, more));
     const std::vector<std::string> environment{
         "LD_PRELOAD=" + application("simulated_phc"), "ASAN_OPTIONS=verify_asan_link_order=0",
-        std::string("SIMULATED_PHC_PATH=") + kDevice, "SIMULATED_PHC_FILE=" + phc_file(),
+        std::string("SIMULATED_PHC_PATH=") + kPtpDevice, "SIMULATED_PHC_FILE=" + phc_file(),
         "SIMULATED_PHC_GONE=" + gone_file()};
     sut.emplace(sandbox_,
                 std::vector<std::string>{"--scheduler", "CmpScheduleOneShot", "--settings", file,
@@ -39,7 +39,7 @@ class HostClockAsReference : public ::testing::Test {
                 environment);
     sut->wait_until_up();
   }
-  void start_on_device() { start(std::string("ptp:") + kDevice); }
+  void start_on_device() { start(std::string("ptp:") + kPtpDevice); }
   // In one step: the device never sees half of it.
   void write_phc(std::int64_t drift_ppb, std::int64_t offset_ns, const std::string& way) const {
     std::filesystem::rename(sandbox_.write("phc.new", fmt::format("{} {} {}\n", drift_ppb, offset_ns, way)),
@@ -55,7 +55,7 @@ class HostClockAsReference : public ::testing::Test {
   /// How far the last release of the 2 ms task is from the device's grid.
   [[nodiscard]] std::int64_t phase_ns() const {
     const std::int64_t release = sut->task("Fast")->counters.release_ns;
-    return SimulatedPhc::read(phc_file().c_str()).phase_ns(release, kInterval);
+    return SimulatedPhc::read(phc_file().c_str()).phase_ns(release, kPtpInterval);
   }
   [[nodiscard]] std::string phc_file() const { return sandbox_.folder() + "/phc"; }
   [[nodiscard]] std::string gone_file() const { return sandbox_.folder() + "/gone"; }
@@ -74,9 +74,9 @@ TEST_F(HostClockAsReference, IsADeviceInEachOfTheWaysThatItCanBeRead) {
     EXPECT_TRUE(becomes(ClockState::locked)) << way << sut->log();
     EXPECT_TRUE(eventually([&] { return std::abs(clock().drift_ppb - 120'000) < 2000; })) << way;
     EXPECT_TRUE(eventually([&] { return std::abs(phase_ns()) < 2000; })) << way;
-    EXPECT_EQ(clock().reference.view(), std::string("ptp:") + kDevice);
+    EXPECT_EQ(clock().reference.view(), std::string("ptp:") + kPtpDevice);
     EXPECT_EQ(clock().problem.view(), "");
-    EXPECT_THAT(sut->log(), HasSubstr(fmt::format("follow {} ({})", kDevice, told)));
+    EXPECT_THAT(sut->log(), HasSubstr(fmt::format("follow {} ({})", kPtpDevice, told)));
     EXPECT_EQ(sut->end(SIGTERM), 0);
   }
 }
@@ -96,7 +96,7 @@ TEST_F(HostClockAsReference, DeviceThatGoesIsHoldOverUntilItIsThereAgain) {
   take_away();
   start_on_device();
   EXPECT_TRUE(becomes(ClockState::free_running));
-  EXPECT_THAT(std::string(clock().problem.view()), HasSubstr(std::string("open ") + kDevice));
+  EXPECT_THAT(std::string(clock().problem.view()), HasSubstr(std::string("open ") + kPtpDevice));
   EXPECT_THAT(sut->log(), HasSubstr("the clock runs freely"));
   give_back();
   EXPECT_TRUE(becomes(ClockState::locked)) << sut->log();
@@ -124,8 +124,8 @@ TEST_F(HostClockAsReference, IsTheTimeOfDay) {
   // The two clocks have the same pace, so one reading tells where the grid lies.
   const auto phase = [&] {
     const std::int64_t ahead = unix_time_ns() - MonotonicClock::now().time_since_epoch().count();
-    const std::int64_t since = (sut->task("Fast")->counters.release_ns + ahead) % kInterval;
-    return since > kInterval / 2 ? since - kInterval : since;
+    const std::int64_t since = (sut->task("Fast")->counters.release_ns + ahead) % kPtpInterval;
+    return since > kPtpInterval / 2 ? since - kPtpInterval : since;
   };
   EXPECT_TRUE(eventually([&] { return std::abs(phase()) < 2000; })) << phase();
   EXPECT_EQ(clock().in_sync, 1U);

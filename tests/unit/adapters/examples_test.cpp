@@ -45,7 +45,7 @@ void read(const std::string& name, Example& example) {
 
 std::vector<std::string> tasks_of(const Example& example) {
   std::vector<std::string> tasks;
-  for (const matiec::PlannedTask& task : example.plan.tasks) {
+  for (const iec::PlannedTask& task : example.plan.tasks) {
     const std::string& event = task.extension.external_event;
     tasks.push_back(task.name + " " + std::to_string(task.priority) + " " +
                     (!event.empty()         ? event
