@@ -40,7 +40,8 @@ class LinuxClockSystem final : public ClockSystem {
   // Looked at before it is opened: to open a watchdog, say, starts it.
   Result<UniqueFd> open(const std::string& path) override {
     struct stat named{};
-    if (::stat(path.c_str(), &named) != 0) return failure(ErrorCode::unavailable, "cannot open " + path, errno);
+    if (::stat(path.c_str(), &named) != 0)
+      return failure(ErrorCode::unavailable, "cannot open " + path, errno);
     if (!is_ptp_clock(named)) return refused(path);
     UniqueFd device(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
     if (!device) return failure(ErrorCode::unavailable, "cannot open " + path, errno);
