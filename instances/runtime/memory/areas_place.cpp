@@ -164,19 +164,15 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
   // All steps that can fail come before anything is written that others see.
   auto made = make_blocks(environment);
   if (made) made = make_keeper(environment);
-  if (made) made = make_outputs_page(environment);
   if (!made) {
     blocks_.clear();  // with all that they have made in the pool
     return std::unexpected(std::move(made).error());
   }
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (!first_of(plan_.blocks[i]).has_image()) continue;
-    make_image(blocks_[i], plan_.blocks[i]);
-    make_registers(blocks_[i], plan_.blocks[i]);
+    if (first_of(plan_.blocks[i]).has_image()) make_image(blocks_[i], plan_.blocks[i]);
   }
   tell_plain_addresses();
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
-  make_safe_outputs();
   count_cycles(tasks);
   wrap(tasks, environment.forces);
   placed_ = true;
@@ -244,8 +240,7 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
     block.inputs = image_in(block.memory.bytes(), size);
   } else {
     block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
-    if (planned.settings == nullptr) return block.outputs->write(block.initial);
-    block.outputs->begin(block.initial, safe_values(*planned.settings));
+    block.outputs->write(block.initial);
   }
 }
 
@@ -297,7 +292,7 @@ std::vector<std::size_t> Areas::users_of(std::size_t index) const {
   return users;
 }
 
-OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task, bool image) const {
+OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task) const {
   OutputView::Writes writes;
   for (const std::size_t area : plan_.blocks[index].areas) {
     const DeclaredArea& declared = declared_[area];
@@ -306,13 +301,10 @@ OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task, bool im
     bool uses = false;
     for (const AreaUse& use : declared.uses) {
       const ByteRange range{.offset = place + use.offset, .bytes = use.bytes};
-      // In an image only this task's bytes are there, changed or not.
-      const bool whole = image && declared.uses.size() == 1;
-      const ByteRange owns = whole ? ByteRange{.offset = place, .bytes = declared.bytes} : range;
-      if (owns.bytes > 0) owned.push_back(owns);
+      if (range.bytes > 0) owned.push_back(range);
       if (task_number(use.task) != task) continue;
       uses = true;
-      if (owns.bytes > 0) writes.own.push_back(owns);
+      if (range.bytes > 0) writes.own.push_back(range);
     }
     if (!uses) continue;
     for (const ByteRange range : rest_of({.offset = place, .bytes = declared.bytes}, owned)) {
@@ -338,11 +330,10 @@ void Areas::make_view(std::size_t index, std::size_t task, bool sole) {
     cycles_[task].add(view);
     tell_view(index, task, view.bytes());
   } else {
-    OutputView::Writes writes = writes_of(index, task, !registers);
+    OutputView::Writes writes = writes_of(index, task);
     writes.sole = sole && !registers;
-    output_tasks_.push_back(task);
     auto& view =
-        registers ? outputs_.emplace_back(index, block.initial, std::move(writes), *block.registers).view
+        registers ? outputs_.emplace_back(index, block.initial, std::move(writes), block.memory.bytes()).view
                   : outputs_.emplace_back(index, block.initial, std::move(writes), block.outputs.get()).view;
     cycles_[task].add(view);
     tell_view(index, task, view.bytes());
