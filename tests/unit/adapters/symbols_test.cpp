@@ -71,9 +71,9 @@ TEST(MatiecSymbols, TellTheElementsOfArraysAndTheMembersOfStructures) {
               "PROGRAM Main VAR p : Point; c : Color; s1 : Small; gr : Grid; list : ARRAY[0..7] OF TIME; "
               "END_VAR ; END_PROGRAM",
               "", "PROGRAM one WITH fast : Main;"));
-  EXPECT_EQ(found.at("one.p.y").value, "PRESS__ONE.P.value.Y");
-  EXPECT_EQ(found.at("one.p.name").type, PLC_TYPE_COUNTED_STRING);
-  const Symbol& tags = found.at("one.p.tags[]");
+  EXPECT_EQ(found.at("one.p.Y").value, "PRESS__ONE.P.value.Y");
+  EXPECT_EQ(found.at("one.p.NAME").type, PLC_TYPE_COUNTED_STRING);
+  const Symbol& tags = found.at("one.p.TAGS[]");
   EXPECT_EQ(tags.value, "PRESS__ONE.P.value.TAGS.table[0]");
   ASSERT_THAT(tags.dimensions, SizeIs(1));
   EXPECT_EQ(tags.dimensions[0].first, 1);
@@ -81,7 +81,7 @@ TEST(MatiecSymbols, TellTheElementsOfArraysAndTheMembersOfStructures) {
   EXPECT_EQ(tags.dimensions[0].stride, "sizeof(PRESS__ONE.P.value.TAGS.table[0])");
   EXPECT_EQ(found.at("one.c").type, PLC_TYPE_DINT);
   EXPECT_EQ(found.at("one.s1").type, PLC_TYPE_INT);
-  const Symbol& deep = found.at("one.gr[][].tags[]");
+  const Symbol& deep = found.at("one.gr[][].TAGS[]");
   EXPECT_EQ(deep.value, "PRESS__ONE.GR.value.table[0][0].TAGS.table[0]");
   ASSERT_THAT(deep.dimensions, SizeIs(3));
   EXPECT_EQ(deep.dimensions[0].first, -1);
