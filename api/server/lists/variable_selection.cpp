@@ -60,7 +60,11 @@ void choose_all(Chosen& chosen, const SymbolTable& table, std::uint64_t after) {
 
 void choose_like(Chosen& chosen, const SymbolTable& table, const std::string& pattern, std::uint64_t after) {
   for (const SymbolTable::Match& match : table.match(pattern)) {
-    if (match.elements.empty()) choose(chosen, match.symbol, std::nullopt, after);
+    const bool by_index = pattern.find('[') != std::string::npos;
+    if (match.elements.empty() && !by_index) choose(chosen, match.symbol, std::nullopt, after);
+    const std::uint32_t all =
+        match.elements.empty() && by_index ? table.symbols()[match.symbol].elements() : 0;
+    for (std::uint32_t element = 0; element < all; ++element) choose(chosen, match.symbol, element, after);
     for (const std::uint32_t element : match.elements) choose(chosen, match.symbol, element, after);
   }
 }

@@ -239,7 +239,9 @@ class Collector {
       symbol.type = PLC_TYPE_DINT;  // an enumeration
       found_.all.push_back(std::move(symbol));
     } else if (const iec::DeclaredType* const declared = find_type(first)) {
-      add_type(variable, std::move(symbol), declared->definition, depth + 1);
+      // "POINT : STRUCT ..."
+      add_type(variable, std::move(symbol), declared->definition.substr(declared->definition.find(':') + 1),
+               depth + 1);
     } else {
       leave_out(variable, symbol, fmt::format("its type {} is not known", first));
     }

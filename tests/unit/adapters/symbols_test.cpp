@@ -94,7 +94,7 @@ TEST(MatiecSymbols, OfLocatedVariablesLieWhereTheirTaskHasThem) {
   const auto found =
       by_name(symbols("PROGRAM Main VAR raw AT %IW1 : INT; END_VAR ; END_PROGRAM",
                       "VAR_GLOBAL lamp AT %QX0.1 : BOOL; END_VAR", "PROGRAM one WITH slow : Main;"));
-  EXPECT_EQ(found.at("one.raw").value, "place_2_1");
+  EXPECT_EQ(found.at("one.raw").value, "place_2_0");
   EXPECT_EQ(found.at("one.raw").area, "%IW1");
   EXPECT_EQ(found.at("lamp").value, "place_0_all");
   EXPECT_EQ(found.at("lamp").type, PLC_TYPE_BOOL);

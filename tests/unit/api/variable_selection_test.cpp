@@ -65,7 +65,7 @@ TEST(VariableSelection, IsOfAllVariablesWithoutAPattern) {
 TEST(VariableSelection, NamesElementsAndWholeVariablesEachOnce) {
   EXPECT_THAT(names_of(plant(), {.patterns = {"LINE.*", "line.speed", "grid[2,1]", "Pump[300].speed"}}),
               ElementsAre("Grid[2,1]", "line.speed", "Line.stop", "pump[300].speed"));
-  EXPECT_THAT(names_of(plant(), {.patterns = {"Grid[*]"}}),
+  EXPECT_THAT(names_of(plant(), {.patterns = {"Grid[*,*]"}}),
               ElementsAre("Grid[1,0]", "Grid[1,1]", "Grid[1,2]", "Grid[2,0]", "Grid[2,1]", "Grid[2,2]"));
   EXPECT_THAT(names_of(plant(), {.patterns = {"Grid"}}), ElementsAre("Grid[][]"));
   EXPECT_THAT(names_of(plant(), {.patterns = {"nothing*"}}), ElementsAre());
