@@ -158,12 +158,12 @@ RTS_HANDLE CDECL SchedGetCurrentTask(void);
  * a granularity of 1 ns, under every scheduler. This is how a fieldbus driver inside of the application lets
  * the task follow a distributed clock ("modify the cycle times of the tasks with a fine granularity").
  *
- * A new interval is the distance between the release that is planned now and the one after it: set within the
- * task's own cycle it already places the release that follows this cycle; set by others, while the task waits
- * for a release, that release stays. It holds until it is set again, also across an exchange of the scheduler
- * and a stop and start; a reset brings the configured one back. Get returns the value that was set last.
- * ERR_OK; ERR_PARAMETER: not the handle of a cyclic task, or out of range; ERR_NOTINITIALIZED: the tasks are
- * not made yet (plc_app_init). Any.
+ * A new interval is the distance between the release that is planned now and the one after it. Set within the
+ * task's own cycle it already places the release that follows this cycle. If another thread sets it while the
+ * task waits for a release, that release stays. It holds until it is set again, also across an exchange of
+ * the scheduler and a stop and start. A reset brings the configured one back. Get returns the value that was
+ * set last. ERR_OK; ERR_PARAMETER: not the handle of a cyclic task, or out of range; ERR_NOTINITIALIZED: the
+ * tasks are not made yet (plc_app_init). Any.
  */
 #define PLC_MIN_INTERVAL_NS 1000L
 #define PLC_MAX_INTERVAL_NS 4320000000000000L /* 50 days */
@@ -253,11 +253,11 @@ typedef struct {
 } Plc_Area;
 
 /*
- * Declares an area. From plc_app_init only; it is placed, and its addresses are written, when that has
- * returned and before the first task runs. *pResult (may be null): ERR_OK; with RTS_INVALID_HANDLE:
- * ERR_PARAMETER (the log says what is wrong), ERR_DUPLICATE: an area of that name, ERR_NOMEMORY: there are
- * PLC_MAX_AREAS, ERR_NOTINITIALIZED. An area that cannot be placed refuses the application, with the line of
- * the settings. Control.
+ * Declares an area. From plc_app_init only. When that has returned, and before the first task runs, the area
+ * is placed and its addresses are written. If an area cannot be placed, the application is refused with the
+ * line of the settings. *pResult (may be null): ERR_OK. With RTS_INVALID_HANDLE it is ERR_PARAMETER (the log
+ * says what is wrong), ERR_DUPLICATE (an area of that name), ERR_NOMEMORY (there are PLC_MAX_AREAS) or
+ * ERR_NOTINITIALIZED. Control.
  */
 RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
 

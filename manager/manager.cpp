@@ -45,7 +45,7 @@ static_assert(kMinPoolObjects == kMinObjects && kMaxPoolObjects == kMaxObjects,
 Result<void> make_run_directory(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
-  if (error) return failure(ErrorCode::system, "make the run directory " + path, error.value());
+  if (error) return failure(ErrorCode::system, "cannot create the run directory " + path, error.value());
   // Locks, sockets and records in it are believed.
   if (auto ours = check_own_folder(path); !ours) return failure_in("[host] run_directory", ours.error());
   return {};
@@ -136,7 +136,7 @@ Result<void> Manager::set_up() {
   if (auto alone = lock_wishes(); !alone) return alone;
   // Children inherit this: instances then bind themselves to their own cores.
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
-    spdlog::warn("the manager stays where it is: {}", bound.error().describe());
+    spdlog::warn("cannot bind the manager to housekeeping_cores: {}", bound.error().describe());
   }
   PLCHOST_TRY_ASSIGN(const auto rights, pool_rights(host));
   clear_names(host.pool, rights);

@@ -71,7 +71,7 @@ Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& righ
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat before{};
   if (!fd || ::fstat(fd.get(), &before) != 0) {
-    return failure(ErrorCode::system, fmt::format("look at the rights of pool '{}'", pool), errno);
+    return failure(ErrorCode::system, fmt::format("cannot read the rights of pool '{}'", pool), errno);
   }
   if (has(before, rights)) return {};
   const std::string had = describe_rights(before.st_uid, before.st_gid, before.st_mode);

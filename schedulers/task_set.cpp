@@ -31,7 +31,7 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
                                                  std::vector<TaskConfig> tasks, TaskEnvironment environment) {
   PLCHOST_TRY(check_tasks(tasks));
   UniqueFd fault_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-  if (!fault_fd) return failure(ErrorCode::system, "eventfd for faults", errno);
+  if (!fault_fd) return failure(ErrorCode::system, "cannot create an event descriptor for faults", errno);
   std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment), std::move(fault_fd)));
   for (TaskConfig& config : tasks) {
     const std::string step = fmt::format("task '{}'", config.name);

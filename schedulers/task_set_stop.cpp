@@ -76,7 +76,7 @@ bool TaskSet::runs_code(std::size_t task) const noexcept {
 
 // The tasks that are stuck when the phase is over; nothing: it is not over. No task is at the first look
 // after the deadline: the whole host, or this core, may have stood still until then. A task that is between
-// two cycles only waits for the processor, which somebody who is stuck may keep from it.
+// two cycles only waits for the processor, which a stuck task may keep from it.
 std::optional<std::vector<std::size_t>> TaskSet::stuck_in_phase(const std::vector<std::size_t>& busy) {
   const bool ended = !stop_->others || ticker_.settled(TimePoint{});
   if ((busy.empty() && ended) || stop_->hurried) return busy;

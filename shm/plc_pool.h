@@ -115,7 +115,7 @@ typedef struct {
 typedef int (*plc_pool_visitor)(const plc_object_info* info, void* user);
 int plc_pool_list(plc_pool* pool, plc_pool_visitor visitor, void* user);
 
-/* ---- Time-outs -------------------------------------------------------------------------------------------
+/* ---- Timeouts --------------------------------------------------------------------------------------------
  */
 
 /* In nanoseconds from now; less than PLC_POOL_FOREVER, as "deadline - now" may be: the time is over. */

@@ -59,11 +59,11 @@ Result<AuditFindings> check_audit(const std::string& folder) {
   AuditWalk walk(findings);
   for (const AuditFile& file : files) {
     std::ifstream lines(file.path);
-    if (!lines) return failure(ErrorCode::system, "open " + file.path, errno);
+    if (!lines) return failure(ErrorCode::system, "cannot open " + file.path, errno);
     std::size_t number = 0;
     for (std::string line; std::getline(lines, line);)
       walk.take(fmt::format("{}:{}", file.path, ++number), line);
-    if (lines.bad()) return failure(ErrorCode::system, "read " + file.path, errno);
+    if (lines.bad()) return failure(ErrorCode::system, "cannot read " + file.path, errno);
   }
   walk.end();
   return findings;

@@ -30,7 +30,7 @@ Result<std::vector<AuditFile>> audit_files(const std::string& folder) {
     const auto parsed = std::from_chars(digits, name.data() + name.size(), file.first);
     if (parsed.ec == std::errc() && name == audit_file_name(file.first)) files.push_back(std::move(file));
   }
-  if (error) return failure(ErrorCode::system, "read folder " + folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot read folder " + folder, error.value());
   std::ranges::sort(files, {}, &AuditFile::first);
   return files;
 }

@@ -26,11 +26,11 @@ namespace {
 // A folder can be locked as a file can; the kernel gives it back whatever ends this process.
 Result<UniqueFd> lock_folder(const std::string& folder) {
   UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!fd) return failure(ErrorCode::system, "open folder " + folder, errno);
+  if (!fd) return failure(ErrorCode::system, "cannot open folder " + folder, errno);
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
   if (errno == EWOULDBLOCK)
     return failure(ErrorCode::busy, folder + " has a writer already: another process");
-  return failure(ErrorCode::system, "lock folder " + folder, errno);
+  return failure(ErrorCode::system, "cannot lock folder " + folder, errno);
 }
 
 AuditRecord of_the_log(std::string what, std::string text) {
@@ -57,7 +57,7 @@ Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
   if (std::filesystem::create_directories(options.folder, error)) {
     std::filesystem::permissions(options.folder, std::filesystem::perms::owner_all, error);
   }
-  if (error) return failure(ErrorCode::system, "make folder " + options.folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot create folder " + options.folder, error.value());
   PLCHOST_TRY_ASSIGN(auto lock, lock_folder(options.folder));
   std::unique_ptr<AuditLog> log(new AuditLog(std::move(options), std::move(lock)));
   PLCHOST_TRY(log->go_on());
@@ -80,9 +80,9 @@ Result<void> AuditLog::go_on() {
 
 Result<void> AuditLog::open_file(const std::string& path) {
   UniqueFd fd(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR));
-  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
   struct stat status{};
-  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "fstat " + path));
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
   bytes_ = static_cast<std::size_t>(status.st_size);
   const std::lock_guard lock(guard_);
   file_ = std::move(fd);
@@ -96,11 +96,11 @@ Result<void> AuditLog::find_end(const std::string& path) {
   std::string tail(std::min(bytes_, kTail), '\0');
   const auto begin = static_cast<off_t>(bytes_ - tail.size());
   const auto got = ::pread(file_.get(), tail.data(), tail.size(), begin);
-  if (got < 0) return failure(ErrorCode::system, "read " + path, errno);
+  if (got < 0) return failure(ErrorCode::system, "cannot read " + path, errno);
   tail.resize(static_cast<std::size_t>(got));
   if (tail.empty()) return write(of_the_log("repair", "this file was empty"));
   if (tail.back() != '\n') {
-    if (::write(file_.get(), "\n", 1) != 1) return failure(ErrorCode::system, "write " + path, errno);
+    if (::write(file_.get(), "\n", 1) != 1) return failure(ErrorCode::system, "cannot write " + path, errno);
     ++bytes_;
     tail += '\n';
   }
@@ -135,7 +135,7 @@ Result<void> AuditLog::write(const AuditRecord& record) {
     const int error = written < 0 ? errno : ENOSPC;
     // Half a record: nobody but this process writes, so it can be taken back.
     if (written > 0) (void)::ftruncate(file_.get(), static_cast<off_t>(bytes_));
-    return failure(ErrorCode::system, "write the audit log in " + options_.folder, error);
+    return failure(ErrorCode::system, "cannot write the audit log in " + options_.folder, error);
   }
   head_ = std::move(moved);
   bytes_ += line.size();

@@ -52,7 +52,7 @@ Result<PendingRecords> PendingRecords::open(std::string folder) {
   if (std::filesystem::create_directories(folder, error)) {
     std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
   }
-  if (error) return failure(ErrorCode::system, "make folder " + folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot create folder " + folder, error.value());
   return PendingRecords(std::move(folder));
 }
 
@@ -67,7 +67,7 @@ Result<void> PendingRecords::add(std::string_view key, const AuditRecord& record
   std::ofstream file(path_of(key), std::ios::binary | std::ios::trunc);
   file << text.dump(-1, ' ', false, json::error_handler_t::replace) << std::flush;
   if (file) return {};
-  return failure(ErrorCode::system, "write " + path_of(key), errno);
+  return failure(ErrorCode::system, "cannot write " + path_of(key), errno);
 }
 
 void PendingRecords::remove(std::string_view key) const {

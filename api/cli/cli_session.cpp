@@ -93,8 +93,9 @@ Result<std::vector<HostView>> CliSession::select(const std::vector<HostView>& al
       fmt::format("no host answers in DDS domain {} within {} s: start one with 'plchostd --config FILE', "
                   "or choose its domain with --domain{}",
                   options.dds.domain, options.timeout_s,
-                  options.dds.identity.empty() ? "; a secured one wants an --identity"
-                                               : "; one that does not accept this identity is silent"));
+                  options.dds.identity.empty()
+                      ? "; a secured host needs an --identity"
+                      : "; a host that does not accept this identity does not answer"));
 }
 
 Result<std::string> CliSession::target_host() {

@@ -35,7 +35,7 @@ class AckAccount {
   void take(const plc_EventAck& ack);
   [[nodiscard]] Sums sums() const noexcept;
   /// From now on report() is about the posts from this number on. Acknowledgements of earlier posts may still
-  /// come: of those that were given up, or that nobody waited for.
+  /// come: of posts that were given up, or that no caller waited for.
   void begin(std::uint64_t first) noexcept;
   [[nodiscard]] PostReport report() const;
   /// Its epoch is 0: none yet.

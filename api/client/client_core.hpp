@@ -39,11 +39,11 @@
 
 namespace plchost {
 
-/// The client's end of the DDS API, asynchronous: any number of calls are under way at the same time, on one
-/// thread, which its pump() lends them. plcctl and the client library are made of it; ControlClient waits for
-/// one call after the other, and says what each of them does. Posts to one host go one call after the other,
-/// in the order in which the calls began. All else goes at the same time. Operations end before their
-/// ClientCore.
+/// The client's end of the DDS API, asynchronous: any number of calls are under way at the same time. They
+/// run on the thread that drives its pump(). plcctl and the client library are made of it. ControlClient
+/// waits for one call after the other, and its comments describe each call. Posts to one host go one call
+/// after the other, in the order in which the calls began. All else goes at the same time. Operations end
+/// before their ClientCore.
 class ClientCore {
  public:
   static constexpr Duration kHostGone = kServerGone;

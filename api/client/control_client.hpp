@@ -74,9 +74,9 @@ class ControlClient {
   /// client for one host: those that DDS has discovered), and which of them may be meant.
   [[nodiscard]] Result<HostView> host(std::string_view name, TimePoint deadline);
 
-  /// Whether a host that was seen does not show its presence at present: its server is dead, or hangs, or
-  /// cannot be reached. Known within 100 ms, also if threads of DDS live on there; wait_for_change() returns
-  /// when it begins and when it ends. A host that stays silent is gone after kHostGone.
+  /// Whether a host that was seen does not show its presence at present: its server has ended, or hangs, or
+  /// cannot be reached. Known within 100 ms, also if threads of DDS still run there; wait_for_change()
+  /// returns when it begins and when it ends. A host that stays silent is gone after kHostGone.
   [[nodiscard]] bool is_silent(std::string_view host);
 
   /// All samples of a status topic that a host shows, complete: waits until as much has come as the host says

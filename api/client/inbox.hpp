@@ -15,7 +15,7 @@
 
 namespace plchost {
 
-/// The number of what was asked, who asked it, and whom.
+/// Request number, client and host.
 struct AnswerKey {
   dds::Guid asker;
   std::int64_t number = 0;
@@ -32,7 +32,7 @@ struct AnswerKey {
 template <class Answer>
 class Inbox {
  public:
-  /// As long as it lives, the answers to one question are kept for it.
+  /// While it exists, the answers to one question are kept for it.
   class Expected {
    public:
     Expected(Inbox& inbox, const AnswerKey& key) : inbox_(inbox), key_(key) { inbox_.answers_[key_]; }

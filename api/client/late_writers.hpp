@@ -11,7 +11,7 @@
 namespace plchost {
 
 /// Until when the hosts are waited for that DDS knows of and that have not shown themselves yet: for each
-/// kPatience at most, so that one that stands still holds up nobody for longer.
+/// kPatience at most, so that one that stands still delays no other for longer.
 class LateWriters {
  public:
   static constexpr Duration kPatience = std::chrono::seconds(5);

@@ -6,11 +6,11 @@
 
 namespace plchost {
 
-/// A server that has not been heard of for so long is gone.
+/// A server whose presence has been missing for so long is gone.
 inline constexpr Duration kServerGone = std::chrono::milliseconds(500);
 
-/// Which server of a host counts: the one of the greatest epoch, as long as it is heard of. The last words of
-/// one that was replaced do not; one whose clock was set back does, once the one before it is gone.
+/// Which server of a host counts: the one of the greatest epoch, while its presence arrives. The last samples
+/// of one that was replaced do not; one whose clock was set back does, once the one before it is gone.
 class NewestEpoch {
  public:
   /// Whether what has come with this epoch counts.

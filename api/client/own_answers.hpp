@@ -41,7 +41,8 @@ class OwnAnswers {
   /// outlives them.
   template <class Answer>
   [[nodiscard]] Result<void> filter(dds_entity_t topic) {
-    return dds::check_code(dds_set_topic_filter_and_arg(topic, is_own<Answer>, this), "filter a topic");
+    return dds::check_code(dds_set_topic_filter_and_arg(topic, is_own<Answer>, this),
+                           "cannot filter a topic");
   }
 
  private:

@@ -100,7 +100,7 @@ Result<void> Poster<Sample>::post_once(std::string_view instance, std::string_vi
   sample_.late_ack = true;
   const dds_return_t written = write(++last_sequence_);
   sample_.late_ack = false;
-  return dds::check_code(written, "post an event");
+  return dds::check_code(written, "cannot post an event");
 }
 
 template <class Sample>

@@ -78,7 +78,7 @@ class Poster {
   [[nodiscard]] bool has_room() const noexcept { return unacknowledged_.size() < window_; }
   [[nodiscard]] std::size_t unacknowledged() const noexcept { return unacknowledged_.size(); }
 
-  /// One post that is not repeated, and whose acknowledgement nobody waits for: as fast as DDS is. One call
+  /// One post that is not repeated, and whose acknowledgement is not awaited: as fast as DDS is. One call
   /// of dds_write.
   [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event) noexcept
     requires std::same_as<Sample, plc_EventPost>;

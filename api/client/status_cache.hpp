@@ -16,7 +16,7 @@
 
 namespace plchost {
 
-/// The end of a sample when nobody who has written it is seen any more.
+/// The end of a sample when none of its writers is seen any more.
 enum class UnseenHost : std::uint8_t {
   forgets,           ///< the sample is gone: it may not be true any more
   keeps_last_words,  ///< the sample stays until the host tells the next one; of topics with one sample a host

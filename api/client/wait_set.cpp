@@ -11,11 +11,12 @@
 namespace plchost {
 
 Result<WaitSet> WaitSet::create(dds_entity_t participant) {
-  PLCHOST_TRY_ASSIGN(auto made, dds::check_entity(dds_create_waitset(participant), "make a wait set"));
-  PLCHOST_TRY_ASSIGN(auto woken,
-                     dds::check_entity(dds_create_guardcondition(participant), "make a guard condition"));
-  if (auto added =
-          dds::check_code(dds_waitset_attach(made.get(), woken.get(), woken.get()), "add to a wait set");
+  PLCHOST_TRY_ASSIGN(auto made,
+                     dds::check_entity(dds_create_waitset(participant), "cannot create a wait set"));
+  PLCHOST_TRY_ASSIGN(auto woken, dds::check_entity(dds_create_guardcondition(participant),
+                                                   "cannot create a guard condition"));
+  if (auto added = dds::check_code(dds_waitset_attach(made.get(), woken.get(), woken.get()),
+                                   "cannot add to a wait set");
       !added) {
     return std::unexpected(added.error());
   }
@@ -23,8 +24,9 @@ Result<WaitSet> WaitSet::create(dds_entity_t participant) {
 }
 
 Result<void> WaitSet::add(dds_entity_t entity, std::uint32_t statuses) const {
-  if (auto set = dds::check_code(dds_set_status_mask(entity, statuses), "choose statuses"); !set) return set;
-  return dds::check_code(dds_waitset_attach(set_.get(), entity, entity), "add to a wait set");
+  if (auto set = dds::check_code(dds_set_status_mask(entity, statuses), "cannot choose statuses"); !set)
+    return set;
+  return dds::check_code(dds_waitset_attach(set_.get(), entity, entity), "cannot add to a wait set");
 }
 
 void WaitSet::wait(TimePoint deadline) const noexcept {

@@ -6,7 +6,7 @@
 
 namespace plchost {
 
-/// Sleeps until one of several readers has data, one of several writers meets or loses a reader, or wake() is
+/// Sleeps until one of several readers has data, one of several writers gets or loses a reader, or wake() is
 /// called.
 class WaitSet {
  public:
@@ -16,7 +16,7 @@ class WaitSet {
   /// writer.
   [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses) const;
   /// Returns at the deadline at the latest, and earlier without cause: look again. Look before the first wait
-  /// and after each: a sample ends one wait, also if nobody takes it.
+  /// and after each: a sample ends one wait, also if it is not taken.
   void wait(TimePoint deadline) const noexcept;
   /// Ends the wait that is under way, else the next one. Any thread.
   void wake() const noexcept;

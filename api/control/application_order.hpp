@@ -14,13 +14,13 @@ namespace plchost {
 /// process, while the tasks run; or is refused.
 inline constexpr std::string_view kOnlineOption = "online";
 
-/// Options of ControlVerb::download_application, beside kBootOption. Those of the API server's own: which
-/// file of shared memory holds what was sent, and for whom.
+/// Options of ControlVerb::download_application, beside kBootOption. Those of the API server's own name the
+/// file in shared memory and its sender.
 inline constexpr std::string_view kSizeOption = "size";      ///< bytes
 inline constexpr std::string_view kDigestOption = "sha256";  ///< 64 lower-case hexadecimal digits
 inline constexpr std::string_view kSourceOption = "source";  ///< number of the file, see download_file_name()
 inline constexpr std::string_view kByOption = "by";          ///< role and name of its sender; may be empty
-inline constexpr std::string_view kFromOption = "from";      ///< his client
+inline constexpr std::string_view kFromOption = "from";      ///< the sender's client
 
 /// An application that was sent, as the options of the command say it.
 struct ApplicationOrder {

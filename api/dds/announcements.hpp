@@ -20,12 +20,13 @@ class Announcements {
   /// Right after the participant was made: its addresses are the configured ones now.
   explicit Announcements(dds_entity_t participant);
 
-  /// From time to time. `remote`: the participants that are there. Forgets the addresses that belonged to
-  /// none of them at the last call either, since one that is just coming has its address first. Returns how
-  /// many it has forgotten.
+  /// To be called periodically. `remote`: the participants that are there. Forgets the addresses that
+  /// belonged to none of them at this call and at the last one, because the address of a new participant is
+  /// known before the participant. Returns the number of forgotten addresses.
   ///
-  /// One that comes again between two calls may be among them too late: Cyclone announces this process no
-  /// more to a participant that it knows, which would stay deaf. So a forgotten address comes back with it.
+  /// A participant that comes again between two calls may be among them too late: Cyclone does not announce
+  /// this process again to a participant that it knows. That participant would receive nothing. So a
+  /// forgotten address comes back with it.
   std::size_t forget_gone(std::span<const Guid> remote);
 
  private:

@@ -7,7 +7,7 @@ namespace plchost::dds {
 
 /// The words for the codes of control.idl. A newer host may know more: its number is shown. Any context.
 [[nodiscard]] std::string instance_state_name(std::uint32_t state);
-/// A state of Transition: its source says whose.
+/// A state of Transition: its source says of which process.
 [[nodiscard]] std::string transition_state_name(std::uint32_t source, std::uint32_t state);
 [[nodiscard]] std::string task_kind_name(std::uint32_t kind);
 [[nodiscard]] std::string log_level_name(std::uint32_t level);

@@ -194,9 +194,10 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
       return failure_in("identity", good.error());
     }
   }
-  PLCHOST_TRY_ASSIGN(auto made, check_entity(dds_create_domain(options.domain, configuration.c_str()),
-                                             fmt::format("make DDS domain {} on interface {}", options.domain,
-                                                         fmt::join(options.interfaces, ", "))));
+  PLCHOST_TRY_ASSIGN(auto made,
+                     check_entity(dds_create_domain(options.domain, configuration.c_str()),
+                                  fmt::format("cannot create DDS domain {} on interface {}", options.domain,
+                                              fmt::join(options.interfaces, ", "))));
   std::shared_ptr<Entity> domain(
       new Entity(std::move(made)),  // NOLINT(cppcoreguidelines-owning-memory): for a deleter of its own
       [number = options.domain](Entity* ended) { end_domain(number, std::unique_ptr<Entity>(ended)); });
@@ -234,11 +235,11 @@ Result<int> tie_sockets_to_loopback() {
     if (family != AF_INET && family != AF_INET6) continue;
     constexpr std::string_view kLoopback = "lo";
     if (::setsockopt(fd, SOL_SOCKET, SO_BINDTODEVICE, kLoopback.data(), kLoopback.size()) != 0) {
-      return failure(ErrorCode::system, "tie a UDP socket to lo", errno);
+      return failure(ErrorCode::system, "cannot tie a UDP socket to lo", errno);
     }
     ++tied;
   }
-  if (error) return failure(ErrorCode::system, "read /proc/self/fd", error.value());
+  if (error) return failure(ErrorCode::system, "cannot read /proc/self/fd", error.value());
   return tied;
 }
 

@@ -46,7 +46,7 @@ struct GuidHash {
 /// writer is gone already.
 [[nodiscard]] Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info) noexcept;
 
-/// The writers that a reader has met: those whose samples are to come as well. As publication_handle.
+/// The writers that a reader is matched with, also those that have sent nothing yet. As publication_handle.
 [[nodiscard]] std::vector<dds_instance_handle_t> writers_of(dds_entity_t reader);
 /// The readers that a writer has met.
 [[nodiscard]] std::vector<dds_instance_handle_t> readers_of(dds_entity_t writer);

@@ -46,7 +46,7 @@ static struct {
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static Local* locals;
 static Pair* pairs;
-static atomic_int doubted;  // pairs that are, so that nobody needs the mutex who asks in vain
+static atomic_int doubted;  // number of doubted pairs; 0: no need to take the mutex
 
 // With the mutex.
 static Pair* pair_of(DDS_Security_IdentityHandle local, DDS_Security_IdentityHandle remote) {

@@ -9,8 +9,8 @@ extern "C" {
 
 // The memory of handshakes of DDS Security, for Cyclone DDS 0.10.2 to 0.10.5. Two participants can lose each
 // other at different times: one drops the other when its lease ends, and later begins a handshake with a new
-// challenge. The other one heard plain announcements all the time. It has its old keys, or waits with its old
-// challenge, and Cyclone alone never leaves that state: the two stay deaf to each other.
+// challenge. The other one received plain announcements all the time. It has its old keys, or waits with its
+// old challenge, and Cyclone alone never leaves that state: neither decodes the other's messages.
 //
 // The memory ends that in three ways:
 // - A handshake that is not complete takes the newest challenge of the other side. Cyclone keeps the first
@@ -18,7 +18,7 @@ extern "C" {
 // - An answer to another challenge than this side's own is not processed. Cyclone refuses it, too, but then
 //   never repeats the message that the other side waits for.
 // - If the other side uses a challenge that is not the one that this side has answered, it has begun anew, or
-//   a stranger says so. For 5 s its plain messages are worth nothing. So the lease ends unless protected
+//   a stranger says so. For 5 s its plain messages are ignored. So the lease ends unless protected
 //   messages come, and this side begins anew, too. The answer that completes a handshake passes all the same:
 //   it has both challenges, which a stranger cannot guess. It does not end the 5 s.
 // A process with several participants has one lease for a remote participant. Messages to one of its own

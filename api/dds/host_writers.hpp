@@ -76,7 +76,7 @@ void end_row(dds_entity_t writer, Sample& row) {
 /// Why an instance has no sample any more.
 enum class InstanceEnd : std::uint8_t {
   disposed,      ///< its host says that there is no such thing
-  without_host,  ///< nobody who has written it is seen any more
+  without_host,  ///< none of its writers is seen any more
 };
 
 /// The same, for what is kept of each instance: `update(handle, sample)`, then `end(handle, why)` if it has

@@ -66,27 +66,29 @@ std::string block_partition(std::string_view to_host, std::string_view from_host
 
 Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic) {
   return check_entity(dds_create_topic(participant, topic.type, topic.name, nullptr, nullptr),
-                      fmt::format("make topic {}", topic.name));
+                      fmt::format("cannot create topic {}", topic.name));
 }
 
 Result<Entity> make_writer(dds_entity_t parent, dds_entity_t topic, const Qos& qos) {
-  return check_entity(dds_create_writer(parent, topic, qos.get(), nullptr), "make a writer");
+  return check_entity(dds_create_writer(parent, topic, qos.get(), nullptr), "cannot create a writer");
 }
 
 Result<Entity> make_reader(dds_entity_t parent, dds_entity_t topic, const Qos& qos) {
-  return check_entity(dds_create_reader(parent, topic, qos.get(), nullptr), "make a reader");
+  return check_entity(dds_create_reader(parent, topic, qos.get(), nullptr), "cannot create a reader");
 }
 
 Result<Entity> make_publisher(dds_entity_t participant, const std::string& partition) {
   Qos qos;
   qos.partition(partition);
-  return check_entity(dds_create_publisher(participant, qos.get(), nullptr), "make publisher " + partition);
+  return check_entity(dds_create_publisher(participant, qos.get(), nullptr),
+                      "cannot create publisher " + partition);
 }
 
 Result<Entity> make_subscriber(dds_entity_t participant, const std::string& partition) {
   Qos qos;
   qos.partition(partition);
-  return check_entity(dds_create_subscriber(participant, qos.get(), nullptr), "make subscriber " + partition);
+  return check_entity(dds_create_subscriber(participant, qos.get(), nullptr),
+                      "cannot create subscriber " + partition);
 }
 
 Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber, const TopicInfo& topic,

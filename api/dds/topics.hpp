@@ -43,7 +43,7 @@ inline constexpr std::string_view kAllHosts = "*";
 [[nodiscard]] std::string status_partition(std::string_view host);
 /// The topics of a host for one client (its participant's GUID in hex).
 [[nodiscard]] std::string client_partition(std::string_view guid_hex, std::string_view host);
-/// Where hosts meet that claim the same name.
+/// The partition of hosts that claim the same name.
 [[nodiscard]] std::string name_partition(std::string_view host);
 /// Blocks, and acknowledgements of blocks, from one host to another.
 [[nodiscard]] std::string block_partition(std::string_view to_host, std::string_view from_host);

@@ -177,8 +177,9 @@ void BlockGateway::tell_of_numbers(TimePoint now) {
   std::string problem;
   if (const auto other = numbers_.ahead()) {
     problem = fmt::format(
-        "host '{}' has number {} since longer: this host sends and takes no blocks of other hosts. Give one "
-        "of the two another [blocks] host_number",
+        "host '{}' has used [blocks] host_number {} longer than this host, which sends and takes no blocks "
+        "of "
+        "other hosts: give one of the two another number",
         other->host, options_.number);
   } else if (!numbers_.serves(now)) {
     return;  // the grace time

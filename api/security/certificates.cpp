@@ -31,7 +31,7 @@ bool add_entry(X509_NAME* name, int what, std::string_view text, int type = V_AS
 Result<GuidPrefix> prefix_of(const X509_NAME* name) {
   unsigned char* der = nullptr;
   const int size = i2d_X509_NAME(name, &der);
-  if (size <= 0) return openssl_failure("read the subject of a certificate");
+  if (size <= 0) return openssl_failure("cannot read the subject of a certificate");
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
   SHA256(der, static_cast<std::size_t>(size), digest.data());
   OPENSSL_free(der);
@@ -54,7 +54,7 @@ Result<Name> plain_name(const Subject& subject) {
   if (!name || !add_entry(name.get(), NID_organizationName, kOrganisation) ||
       !add_entry(name.get(), NID_organizationalUnitName, to_string(subject.role)) ||
       !add_entry(name.get(), NID_commonName, subject.name)) {
-    return openssl_failure(fmt::format("make the subject '{}'", subject.name));
+    return openssl_failure(fmt::format("cannot create the subject '{}'", subject.name));
   }
   return name;
 }
@@ -68,7 +68,7 @@ Result<Name> make_name(const Subject& subject) {
     // The first try of a client has none: its subject says what it must and no more.
     if ((wants_lowest || number > 0) &&
         !add_entry(name.get(), NID_serialNumber, std::to_string(number), V_ASN1_PRINTABLESTRING)) {
-      return openssl_failure("make a subject");
+      return openssl_failure("cannot create a subject");
     }
     PLCHOST_TRY_ASSIGN(const auto prefix, prefix_of(name.get()));
     if (is_lowest(prefix) == wants_lowest) return name;
@@ -98,7 +98,7 @@ Result<Certificate> begin_certificate(const Name& subject, const Validity& valid
       X509_set_subject_name(made.get(), subject.get()) != 1 || X509_set_pubkey(made.get(), key.get()) != 1 ||
       ASN1_TIME_set(X509_getm_notBefore(made.get()), validity.not_before) == nullptr ||
       ASN1_TIME_set(X509_getm_notAfter(made.get()), validity.not_after) == nullptr) {
-    return openssl_failure("make a certificate");
+    return openssl_failure("cannot create a certificate");
   }
   return made;
 }
@@ -106,7 +106,7 @@ Result<Certificate> begin_certificate(const Name& subject, const Validity& valid
 Result<std::time_t> unix_time(const ASN1_TIME* time) {
   std::tm parts{};
   if (ASN1_TIME_to_tm(time, &parts) != 1)
-    return openssl_failure("read a time of a certificate", ErrorCode::corrupt);
+    return openssl_failure("cannot read a time of a certificate", ErrorCode::corrupt);
   return ::timegm(&parts);
 }
 
@@ -123,7 +123,7 @@ std::string entry_of(const X509_NAME* name, int what) {
 
 Result<Key> make_key() {
   Key key(EVP_PKEY_Q_keygen(nullptr, nullptr, "EC", "P-256"));
-  if (!key) return openssl_failure("make a private key");
+  if (!key) return openssl_failure("cannot create a private key");
   return key;
 }
 
@@ -132,7 +132,7 @@ Result<Authority> make_authority(const std::string& name, const Validity& validi
   const Name subject(X509_NAME_new());
   if (!subject || !add_entry(subject.get(), NID_organizationName, kOrganisation) ||
       !add_entry(subject.get(), NID_commonName, name)) {
-    return openssl_failure(fmt::format("make the subject '{}'", name));
+    return openssl_failure(fmt::format("cannot create the subject '{}'", name));
   }
   PLCHOST_TRY_ASSIGN(auto made, begin_certificate(subject, validity, key));
   X509* const raw = made.get();
@@ -141,7 +141,7 @@ Result<Authority> make_authority(const std::string& name, const Validity& validi
       !add_extension(raw, raw, NID_key_usage, "critical,keyCertSign,cRLSign,digitalSignature") ||
       !add_extension(raw, raw, NID_subject_key_identifier, "hash") ||
       X509_sign(raw, key.get(), EVP_sha256()) == 0) {
-    return openssl_failure(fmt::format("make the authority '{}'", name));
+    return openssl_failure(fmt::format("cannot create the authority '{}'", name));
   }
   return Authority{std::move(made), std::move(key)};
 }
@@ -158,7 +158,7 @@ Result<Certificate> issue_certificate(const Subject& subject, const Validity& va
       !add_extension(raw, issuer, NID_subject_key_identifier, "hash") ||
       !add_extension(raw, issuer, NID_authority_key_identifier, "keyid") ||
       X509_sign(raw, authority.key.get(), EVP_sha256()) == 0) {
-    return openssl_failure(fmt::format("make a certificate for '{}'", subject.name));
+    return openssl_failure(fmt::format("cannot create a certificate for '{}'", subject.name));
   }
   return made;
 }
@@ -187,7 +187,7 @@ Result<std::string> subject_text(const Certificate& certificate) {
   const Bio bio = writing_bio();
   if (X509_NAME_print_ex(bio.get(), X509_get_subject_name(certificate.get()), 0,
                          XN_FLAG_RFC2253 & ~ASN1_STRFLGS_ESC_MSB) < 0) {
-    return openssl_failure("write the subject of a certificate");
+    return openssl_failure("cannot write the subject of a certificate");
   }
   return text_of(bio);
 }
@@ -196,7 +196,7 @@ Result<std::string> serial_text(const Certificate& certificate) {
   const std::unique_ptr<BIGNUM, OpensslFree<BN_free>> number(
       ASN1_INTEGER_to_BN(X509_get0_serialNumber(certificate.get()), nullptr));
   char* const digits = number ? BN_bn2hex(number.get()) : nullptr;
-  if (digits == nullptr) return openssl_failure("read the serial number of a certificate");
+  if (digits == nullptr) return openssl_failure("cannot read the serial number of a certificate");
   std::string text = digits;
   OPENSSL_free(digits);
   return text;

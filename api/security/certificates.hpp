@@ -18,7 +18,7 @@ struct Validity {
   std::time_t not_after = 0;
 };
 
-/// Whom a certificate is for. In it: O=plchost, OU=<role>, CN=<name>, and for hosts a serialNumber.
+/// The holder of a certificate. In it: O=plchost, OU=<role>, CN=<name>, and for hosts a serialNumber.
 struct Subject {
   Role role = Role::viewer;
   std::string name;

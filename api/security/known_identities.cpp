@@ -62,7 +62,7 @@ Result<KnownIdentities> KnownIdentities::load(const std::string& folder) {
     }
   }
   if (error) {
-    return failure(ErrorCode::system, fmt::format("read {}: only the folder of a host has it", known),
+    return failure(ErrorCode::system, fmt::format("cannot read {}: only the folder of a host has it", known),
                    error.value());
   }
   return identities;

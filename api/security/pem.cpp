@@ -31,7 +31,7 @@ Result<Owner> read_pem(const std::string& path, std::string_view what, Read read
 template <class Write>
 Result<std::string> write_pem(std::string_view what, Write write) {
   const Bio bio = writing_bio();
-  if (write(bio.get()) != 1) return openssl_failure(fmt::format("write a {}", what));
+  if (write(bio.get()) != 1) return openssl_failure(fmt::format("cannot write a {}", what));
   return text_of(bio);
 }
 
@@ -42,17 +42,18 @@ Result<std::string> read_file(const std::string& path) {
   const UniqueFd file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
   if (!file) {
     const int reason = errno;
-    return failure(reason == ENOENT ? ErrorCode::not_found : ErrorCode::system, "read " + path, reason);
+    return failure(reason == ENOENT ? ErrorCode::not_found : ErrorCode::system, "cannot read " + path,
+                   reason);
   }
   struct stat status{};
-  if (::fstat(file.get(), &status) != 0) return failure(ErrorCode::system, "read " + path, errno);
+  if (::fstat(file.get(), &status) != 0) return failure(ErrorCode::system, "cannot read " + path, errno);
   if (!S_ISREG(status.st_mode)) return failure(ErrorCode::corrupt, path + " is no regular file");
   std::string text(kMaxSecurityFile + 1, '\0');
   std::size_t size = 0;
   while (size < text.size()) {
     const ssize_t count = ::read(file.get(), text.data() + size, text.size() - size);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return failure(ErrorCode::system, "read " + path, errno);
+    if (count < 0) return failure(ErrorCode::system, "cannot read " + path, errno);
     if (count == 0) break;
     size += static_cast<std::size_t>(count);
   }

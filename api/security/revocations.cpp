@@ -82,7 +82,7 @@ Result<RevocationList> make_revocations(const RevocationList& known, std::span<c
       !set_times(made.get(), validity) || (known && !copy_entries(known.get(), made.get())) ||
       !add_entries(made.get(), added, std::time(nullptr)) || !add_number(made.get(), known.get()) ||
       X509_CRL_sort(made.get()) != 1 || X509_CRL_sign(made.get(), authority.key.get(), EVP_sha256()) == 0) {
-    return openssl_failure("make the list of revoked certificates");
+    return openssl_failure("cannot create the list of revoked certificates");
   }
   return made;
 }
@@ -99,7 +99,7 @@ Result<void> verify_certificate(const Certificate& certificate, const Certificat
   if (!store || !context || X509_STORE_add_cert(store.get(), authority.get()) != 1 ||
       (revocations && X509_STORE_add_crl(store.get(), revocations.get()) != 1) ||
       X509_STORE_CTX_init(context.get(), store.get(), certificate.get(), nullptr) != 1) {
-    return openssl_failure("prepare the check of a certificate");
+    return openssl_failure("cannot prepare the check of a certificate");
   }
   if (revocations) X509_STORE_CTX_set_flags(context.get(), X509_V_FLAG_CRL_CHECK);
   if (X509_verify_cert(context.get()) == 1) return {};

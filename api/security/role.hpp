@@ -21,7 +21,7 @@ enum class Role : std::uint8_t {
 /// invalid_argument: no role is called so; the text lists them.
 [[nodiscard]] Result<Role> parse_role(std::string_view text);
 
-/// Whether who has the one role may do what the other may.
+/// True if `role` includes the rights of `needed`.
 [[nodiscard]] bool includes(Role role, Role needed) noexcept;
 
 }  // namespace plchost::security

@@ -29,7 +29,7 @@ constexpr std::string_view kPermissionsAuthorityKey = "permissions_ca_key.pem";
 constexpr std::time_t kDay = 86'400;
 Result<void> rename_path(const std::string& from, const std::string& to) {
   if (::rename(from.c_str(), to.c_str()) == 0) return {};
-  return failure(ErrorCode::system, fmt::format("rename {} to {}", from, to), errno);
+  return failure(ErrorCode::system, fmt::format("cannot rename {} to {}", from, to), errno);
 }
 
 Result<void> write_authority(const Authority& authority, const std::string& folder,
@@ -116,7 +116,8 @@ Result<SecurityFolder> SecurityFolder::open(const std::string& folder) {
                                folder, authorities),
                    errno);
   }
-  if (::flock(lock.get(), LOCK_EX) != 0) return failure(ErrorCode::system, "lock " + authorities, errno);
+  if (::flock(lock.get(), LOCK_EX) != 0)
+    return failure(ErrorCode::system, "cannot lock " + authorities, errno);
   PLCHOST_TRY_ASSIGN(auto identity,
                      read_authority(authorities, kIdentityAuthorityFile, kIdentityAuthorityKey));
   PLCHOST_TRY_ASSIGN(auto permissions,
@@ -219,7 +220,7 @@ Result<std::vector<std::string>> SecurityFolder::names() const {
     if (name.starts_with('.') || !fs::exists(entry->path() / kCertificateFile, ignored)) continue;
     found.push_back(name);
   }
-  if (error) return failure(ErrorCode::system, "read " + folder_, error.value());
+  if (error) return failure(ErrorCode::system, "cannot read " + folder_, error.value());
   std::ranges::sort(found);
   return found;
 }

@@ -19,9 +19,9 @@ struct IdentityView {
   GuidPrefix prefix{};
 };
 
-/// The folder of `plcctl security`: DIR/authorities holds the two authorities and their keys and belongs to
-/// whom manages the plant; DIR/NAME is the folder of the identity NAME, to be copied to where it is used.
-/// The owner of such an object has the folder alone. Files are replaced as a whole.
+/// The folder of `plcctl security`. DIR/authorities holds the two authorities and their keys. Only the
+/// plant's administrator keeps DIR/authorities. DIR/NAME is the folder of the identity NAME, to be copied to
+/// where it is used. The owner of such an object has the folder alone. Files are replaced as a whole.
 class SecurityFolder {
  public:
   /// A fresh folder with its authorities and the identity of the plant's first host, which must be called as

@@ -25,8 +25,8 @@ Result<void> write_text(const std::string& path, const Result<std::string>& text
 
 Result<void> make_folder(const std::string& path) {
   if (::mkdir(path.c_str(), 0700) == 0) return {};
-  return failure(errno == EEXIST ? ErrorCode::already_exists : ErrorCode::system, "make the folder " + path,
-                 errno);
+  return failure(errno == EEXIST ? ErrorCode::already_exists : ErrorCode::system,
+                 "cannot create the folder " + path, errno);
 }
 
 Result<IdentityView> SecurityFolder::view(const std::string& name) const {
@@ -82,7 +82,7 @@ Result<std::vector<Certificate>> SecurityFolder::issued(const std::string& name)
     PLCHOST_TRY_ASSIGN(auto certificate, read_certificate(entry->path()));
     found.push_back(std::move(certificate));
   }
-  if (error) return failure(ErrorCode::system, "read " + folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot read " + folder, error.value());
   return found;
 }
 

@@ -21,7 +21,7 @@ Result<std::string> sign_document(std::string_view text, const Authority& author
   // The document that was read for the signature is read again for the message.
   const Bio again = reading_bio(text);
   if (!message || SMIME_write_PKCS7(out.get(), message.get(), again.get(), kFlags) != 1) {
-    return openssl_failure("sign a document");
+    return openssl_failure("cannot sign a document");
   }
   return text_of(out);
 }
@@ -36,7 +36,7 @@ Result<std::string> open_document(std::string_view what, std::string_view docume
   const Store store(X509_STORE_new());
   const Bio out = writing_bio();
   if (!store || X509_STORE_add_cert(store.get(), authority.get()) != 1) {
-    return openssl_failure("prepare the check of a signature");
+    return openssl_failure("cannot prepare the check of a signature");
   }
   if (PKCS7_verify(message.get(), nullptr, store.get(), content, out.get(), PKCS7_TEXT) != 1) {
     return openssl_failure(fmt::format("{} is not as the permissions authority signed it", what),

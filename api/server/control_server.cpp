@@ -55,7 +55,7 @@ void raise_event(int fd) noexcept {
 Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions options) {
   PLCHOST_TRY(check_name("host", options.host, kMaxHostName));
   auto pool = ObjectPool::attach(options.pool);
-  if (!pool) return failure_in("attach the pool", pool.error());
+  if (!pool) return failure_in("cannot attach the pool", pool.error());
   const auto epoch = static_cast<std::uint64_t>(unix_time_ns());
   auto parts = std::make_unique<Parts>(std::move(options), std::move(*pool), epoch);
   PLCHOST_TRY(parts->open());
@@ -103,7 +103,7 @@ Result<void> ControlServer::Parts::raise_loop() const {
   if (options.dds.receive_fifo == 0) return {};
   const sched_param priority{.sched_priority = options.dds.receive_fifo + 1};
   return check_returned(::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority),
-                        "raise the control loop");
+                        "cannot raise the priority of the control loop");
 }
 
 Result<void> ControlServer::Parts::run() {
@@ -111,13 +111,14 @@ Result<void> ControlServer::Parts::run() {
   for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(), run_timer.get(),
                        identity_timer.get(), manager->fd()}) {
     epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
-    PLCHOST_TRY(check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch a descriptor"));
+    PLCHOST_TRY(
+        check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "cannot watch a descriptor"));
   }
   spdlog::info("host '{}' is served in DDS domain {}", options.host, options.dds.domain);
   for (;;) {
     std::array<epoll_event, 8> events{};
     const int count = ::epoll_wait(epoll.get(), events.data(), static_cast<int>(events.size()), -1);
-    if (count < 0 && errno != EINTR) return failure(ErrorCode::system, "wait for events", errno);
+    if (count < 0 && errno != EINTR) return failure(ErrorCode::system, "cannot wait for events", errno);
     for (int i = 0; i < count; ++i) {
       PLCHOST_TRY_ASSIGN(const auto go_on, dispatch(events[static_cast<std::size_t>(i)].data.fd));
       if (!go_on) return {};
@@ -178,13 +179,11 @@ void ControlServer::Parts::tell_of_refused(TimePoint now) {
   const std::uint64_t datagrams = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
   if (const auto more = refused_datagrams.take(datagrams, now)) {
     spdlog::warn(
-        "{} datagrams were refused, whole or in part, before DDS has read them: no RTPS, or not as it must "
-        "be",
+        "{} datagrams were rejected before DDS read them, whole or in part: they are no RTPS, or malformed",
         more);
   }
   if (const auto more = malformed_posts.take(intake->malformed(), now)) {
-    spdlog::warn("{} posts were refused: of another source than their writer, or numbered as none can be",
-                 more);
+    spdlog::warn("{} posts rejected: source differs from the writer, or invalid sequence number", more);
   }
 }
 

@@ -28,10 +28,10 @@ constexpr Duration kIdentityLook = std::chrono::milliseconds(500);
 /// A period of 0: it is not set.
 Result<UniqueFd> make_timer(Duration period) {
   PLCHOST_TRY_ASSIGN(const auto fd, check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK),
-                                                "make a timer"));
+                                                "cannot create a timer"));
   UniqueFd timer(fd);
   const itimerspec times{.it_interval = to_timespec(period), .it_value = to_timespec(period)};
-  PLCHOST_TRY(check_errno(::timerfd_settime(timer.get(), 0, &times, nullptr), "set a timer"));
+  PLCHOST_TRY(check_errno(::timerfd_settime(timer.get(), 0, &times, nullptr), "cannot set a timer"));
   return timer;
 }
 
@@ -41,9 +41,9 @@ Result<UniqueFd> make_signal_fd() {
   ::sigaddset(&set, SIGTERM);
   ::sigaddset(&set, SIGINT);
   // Before any thread of DDS is made: they inherit it.
-  PLCHOST_TRY(check_returned(::pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"));
+  PLCHOST_TRY(check_returned(::pthread_sigmask(SIG_BLOCK, &set, nullptr), "cannot block signals"));
   PLCHOST_TRY_ASSIGN(const auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK),
-                                                "make a signal descriptor"));
+                                                "cannot create a signal descriptor"));
   return UniqueFd(fd);
 }
 
@@ -107,11 +107,11 @@ Result<void> ControlServer::Parts::make_loop() {
   PLCHOST_TRY_ASSIGN(presence_timer, make_timer(dds::kPresencePeriod));
   PLCHOST_TRY_ASSIGN(identity_timer, make_timer(kIdentityLook));
   PLCHOST_TRY_ASSIGN(run_timer, make_timer(Duration::zero()));
-  PLCHOST_TRY_ASSIGN(const auto event,
-                     check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "make an event descriptor"));
+  PLCHOST_TRY_ASSIGN(const auto event, check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK),
+                                                   "cannot create an event descriptor"));
   wake.reset(event);
   PLCHOST_TRY_ASSIGN(const auto loop,
-                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor"));
+                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "cannot create an epoll descriptor"));
   epoll.reset(loop);
   return {};
 }
@@ -207,7 +207,7 @@ Result<void> ControlServer::Parts::listen() {
     dds_lset_data_available(listener, function);
     const dds_return_t returned = dds_set_listener(reader, listener);
     dds_delete_listener(listener);
-    return dds::check_code(returned, "listen to a reader");
+    return dds::check_code(returned, "cannot listen to a reader");
   };
   for (const dds_entity_t reader : sessions->discovery_readers()) {
     PLCHOST_TRY(set(reader, on_wake_listener));

@@ -11,7 +11,7 @@ namespace plchost {
 
 Result<ManagerLink> ManagerLink::connect(const std::string& run_directory) {
   auto socket = PacketSocket::connect(run_directory + "/manager.sock");
-  if (!socket) return failure_in("reach the manager", socket.error());
+  if (!socket) return failure_in("cannot reach the manager", socket.error());
   return ManagerLink(std::move(*socket));
 }
 
@@ -25,7 +25,7 @@ Result<void> ManagerLink::send(ControlRequest request, PendingCommand command) {
   }
   request.number = next_number_++;
   if (auto sent = socket_.send(encode(request)); !sent)
-    return failure_in("pass to the manager", sent.error());
+    return failure_in("cannot pass the command to the manager", sent.error());
   pending_.emplace(request.number, std::move(command));
   return {};
 }

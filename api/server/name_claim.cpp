@@ -76,11 +76,11 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
   const std::string partition = dds::name_partition(options.host);
   const dds::Qos qos = dds::qos_of(dds::kNameClaim);
   auto subscriber = dds::make_subscriber(participant, partition);
-  if (!subscriber) return failure_in("claim the host's name", std::move(subscriber).error());
+  if (!subscriber) return failure_in("cannot claim the host's name", std::move(subscriber).error());
   auto claims = dds::open_reader(participant, subscriber->get(), dds::kNameClaim, qos);
-  if (!claims) return failure_in("claim the host's name", std::move(claims).error());
+  if (!claims) return failure_in("cannot claim the host's name", std::move(claims).error());
   auto own_claim = dds::open_writer(participant, partition, claims->topic.get(), qos);
-  if (!own_claim) return failure_in("claim the host's name", std::move(own_claim).error());
+  if (!own_claim) return failure_in("cannot claim the host's name", std::move(own_claim).error());
   claim.subscriber_ = *std::move(subscriber);
   claim.claims_ = *std::move(claims);
   claim.own_claim_ = *std::move(own_claim);
@@ -97,7 +97,7 @@ Result<void> NameClaim::write() {
   sample.serving = own_.serving;
   dds::copy_text(sample.place, own_.place);
   dds::copy_text(sample.machine, own_.machine);
-  return dds::check_code(dds_write(own_claim_.writer.get(), &sample), "claim the host's name");
+  return dds::check_code(dds_write(own_claim_.writer.get(), &sample), "cannot claim the host's name");
 }
 
 Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {

@@ -54,7 +54,7 @@ bool is_latency(std::string_view text) {
 Result<std::string> read_text(int fd, const std::string& path) {
   std::array<char, 32> buffer{};
   PLCHOST_TRY_ASSIGN(const auto length,
-                     check_errno(::pread(fd, buffer.data(), buffer.size(), 0), "read " + path));
+                     check_errno(::pread(fd, buffer.data(), buffer.size(), 0), "cannot read " + path));
   std::string text(buffer.data(), static_cast<std::size_t>(length));
   while (text.ends_with('\n')) text.pop_back();
   return text;
@@ -64,7 +64,8 @@ Result<std::string> read_latency(const std::string& path) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!fd) {
     const int error = errno;
-    return failure(error == ENOENT ? ErrorCode::unsupported : ErrorCode::refused, "open " + path, error);
+    return failure(error == ENOENT ? ErrorCode::unsupported : ErrorCode::refused, "cannot open " + path,
+                   error);
   }
   auto text = read_text(fd.get(), path);
   if (text && !is_latency(*text)) {
@@ -76,20 +77,20 @@ Result<std::string> read_latency(const std::string& path) {
 
 Result<void> write_latency(const std::string& path, std::string_view value) {
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
-  if (!fd) return failure(ErrorCode::refused, "open " + path, errno);
-  PLCHOST_TRY(check_errno(::write(fd.get(), value.data(), value.size()), "write " + path));
+  if (!fd) return failure(ErrorCode::refused, "cannot open " + path, errno);
+  PLCHOST_TRY(check_errno(::write(fd.get(), value.data(), value.size()), "cannot write " + path));
   return {};
 }
 
 // One process at a time takes, gives back or tidies up. Held for some microseconds.
 Result<UniqueFd> enter(const std::string& run_directory) {
   UniqueFd fd(::open(run_directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!fd) return failure(ErrorCode::refused, "open " + run_directory, errno);
+  if (!fd) return failure(ErrorCode::refused, "cannot open " + run_directory, errno);
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
   if (errno == EWOULDBLOCK) {
     return failure(ErrorCode::busy, fmt::format("another process works on the records in {}", run_directory));
   }
-  return failure(ErrorCode::system, "lock " + run_directory, errno);
+  return failure(ErrorCode::system, "cannot lock " + run_directory, errno);
 }
 
 Result<UniqueFd> enter_soon(const std::string& run_directory) {
@@ -126,15 +127,16 @@ Result<UniqueFd> make_record(const std::string& run_directory, int core, const s
   const std::string path = record_path(run_directory, core);
   constexpr mode_t kMode = 0640;
   UniqueFd record(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, kMode));
-  if (!record) return failure(ErrorCode::refused, "open " + path, errno);
+  if (!record) return failure(ErrorCode::refused, "cannot open " + path, errno);
   PLCHOST_TRY_ASSIGN(const auto kept, read_text(record.get(), path));
   if (!is_latency(kept)) {
     if (::ftruncate(record.get(), 0) != 0 ||
         ::pwrite(record.get(), before.data(), before.size(), 0) != static_cast<ssize_t>(before.size())) {
-      return failure(ErrorCode::system, "write " + path, errno);
+      return failure(ErrorCode::system, "cannot write " + path, errno);
     }
   }
-  if (::flock(record.get(), LOCK_SH | LOCK_NB) != 0) return failure(ErrorCode::system, "lock " + path, errno);
+  if (::flock(record.get(), LOCK_SH | LOCK_NB) != 0)
+    return failure(ErrorCode::system, "cannot lock " + path, errno);
   return record;
 }
 

@@ -34,16 +34,16 @@ Result<UniqueFd> take_signals() {
   sigaddset(&signals, SIGINT);
   ::sigprocmask(SIG_SETMASK, &signals, nullptr);
   UniqueFd fd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
-  if (!fd) return failure(ErrorCode::system, "signalfd", errno);
+  if (!fd) return failure(ErrorCode::system, "cannot create a signal descriptor", errno);
   return fd;
 }
 
 Result<UniqueFd> start_heartbeat() {
   UniqueFd fd(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
-  if (!fd) return failure(ErrorCode::system, "timerfd_create", errno);
+  if (!fd) return failure(ErrorCode::system, "cannot create a timer", errno);
   const timespec interval = to_timespec(Duration(Instance::kHeartbeat));
   const itimerspec timer{.it_interval = interval, .it_value = interval};
-  if (const auto set = check_errno(::timerfd_settime(fd.get(), 0, &timer, nullptr), "timerfd_settime");
+  if (const auto set = check_errno(::timerfd_settime(fd.get(), 0, &timer, nullptr), "cannot set a timer");
       !set) {
     return std::unexpected(set.error());
   }
@@ -61,7 +61,7 @@ Result<void> serve(Instance& instance, const UniqueFd& signals, const UniqueFd& 
     const timespec timeout = to_timespec(soon.value_or(Duration::zero()));
     if (::ppoll(fds.data(), fds.size(), soon ? &timeout : nullptr, nullptr) < 0) {
       if (errno == EINTR) continue;
-      return failure(ErrorCode::system, "poll", errno);
+      return failure(ErrorCode::system, "cannot wait for events", errno);
     }
     signalfd_siginfo signal{};
     if (fds[0].revents != 0 && ::read(signals.get(), &signal, sizeof signal) > 0) {

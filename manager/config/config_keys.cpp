@@ -188,8 +188,7 @@ constexpr std::array kDdsKeys = {
     dds<&DdsConfig::allow_unsecured, TruthKey>(
         {.name = "allow_unsecured",
          .when = new_server,
-         .meaning =
-             "without `identity`: be on that interface all the same, and be controlled by all who reach it"}),
+         .meaning = "true: serve this interface without security; anyone on it can control the host"}),
 };
 
 constexpr std::array kBlocksKeys = {

@@ -36,10 +36,10 @@ Result<void> make_folder(const std::string& folder) {
   const std::filesystem::path path(folder);
   if (std::filesystem::is_directory(path, error)) return {};
   std::filesystem::create_directories(path, error);
-  if (error) return failure(ErrorCode::system, "make folder " + folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot create folder " + folder, error.value());
   for (const auto& made : {path, path.parent_path()}) {
     std::filesystem::permissions(made, std::filesystem::perms::owner_all, error);
-    if (error) return failure(ErrorCode::system, "set the rights of " + made.string(), error.value());
+    if (error) return failure(ErrorCode::system, "cannot set the rights of " + made.string(), error.value());
     if (auto synced = sync_directory(made.parent_path()); !synced) return synced;
   }
   return {};
@@ -63,7 +63,7 @@ void remove_unfinished(const std::string& folder, const std::set<std::string>& u
 Result<void> write_fully(int fd, std::span<const std::byte> bytes, const std::string& path) {
   while (!bytes.empty()) {
     PLCHOST_TRY_ASSIGN(const auto written,
-                       check_errno(::write(fd, bytes.data(), bytes.size()), "write " + path));
+                       check_errno(::write(fd, bytes.data(), bytes.size()), "cannot write " + path));
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
   return {};
@@ -75,7 +75,7 @@ Result<void> copy_checked(const StoreOrder& order, int from, int to, const std::
   for (std::uint64_t left = order.size; left > 0;) {
     const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(left, buffer.size()));
     PLCHOST_TRY_ASSIGN(const auto got,
-                       check_errno(::read(from, buffer.data(), wanted), "read " + order.source));
+                       check_errno(::read(from, buffer.data(), wanted), "cannot read " + order.source));
     if (got == 0) {
       return failure(ErrorCode::corrupt, fmt::format("only {} of {} bytes of {} have come", order.size - left,
                                                      order.size, order.name));
@@ -93,14 +93,14 @@ Result<void> copy_checked(const StoreOrder& order, int from, int to, const std::
 
 Result<void> copy_file(const StoreOrder& order, const std::string& path) {
   const UniqueFd from(::open(order.source.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (!from) return failure(ErrorCode::system, "open " + order.source, errno);
+  if (!from) return failure(ErrorCode::system, "cannot open " + order.source, errno);
   struct stat status{};
-  PLCHOST_TRY(check_errno(::fstat(from.get(), &status), "look at " + order.source));
+  PLCHOST_TRY(check_errno(::fstat(from.get(), &status), "cannot examine " + order.source));
   if (!S_ISREG(status.st_mode)) return failure(ErrorCode::wrong_type, order.source + " is no plain file");
   const UniqueFd to(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, kFileMode));
-  if (!to) return failure(ErrorCode::system, "open " + path, errno);
+  if (!to) return failure(ErrorCode::system, "cannot open " + path, errno);
   if (auto copied = copy_checked(order, from.get(), to.get(), path); !copied) return copied;
-  const auto synced = check_errno(::fsync(to.get()), "fsync " + path);
+  const auto synced = check_errno(::fsync(to.get()), "cannot sync " + path);
   return synced ? Result<void>() : std::unexpected(synced.error());
 }
 
@@ -111,7 +111,7 @@ Result<void> put_in_place(const StoreOrder& order, const std::string& path) {
   auto done = copy_file(order, fresh);
   if (done) {
     std::filesystem::rename(fresh, path, error);
-    if (error) done = failure(ErrorCode::system, "rename " + fresh, error.value());
+    if (error) done = failure(ErrorCode::system, "cannot rename " + fresh, error.value());
   }
   if (done) done = sync_directory(order.folder);
   if (!done) std::filesystem::remove(fresh, error);
@@ -202,7 +202,7 @@ Result<std::string> set_boot(const StoreOrder& order) {
   if (order.boot == order.configured) {
     std::error_code error;
     std::filesystem::remove(boot_path(order.folder), error);
-    if (error) return failure(ErrorCode::system, "remove " + boot_path(order.folder), error.value());
+    if (error) return failure(ErrorCode::system, "cannot remove " + boot_path(order.folder), error.value());
   } else if (auto written = replace_file(boot_path(order.folder), order.boot, kFileMode); !written) {
     return std::unexpected(written.error());
   }

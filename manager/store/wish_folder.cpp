@@ -27,9 +27,9 @@ Result<void> make_wish_folder(const std::string& folder) {
   std::error_code error;
   if (std::filesystem::is_directory(folder, error)) return {};
   std::filesystem::create_directories(folder, error);
-  if (error) return failure(ErrorCode::system, "make folder " + folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot create folder " + folder, error.value());
   std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
-  if (error) return failure(ErrorCode::system, "set the rights of " + folder, error.value());
+  if (error) return failure(ErrorCode::system, "cannot set the rights of " + folder, error.value());
   return sync_directory(std::filesystem::path(folder).parent_path());
 }
 

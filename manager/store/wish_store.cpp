@@ -29,16 +29,17 @@ Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
     // A folder that this user may not even look into was never one of his manager's.
     const bool none =
         error == ENOENT || error == ENOTDIR || (error == EACCES && ::access(folder.c_str(), X_OK) != 0);
-    return failure(none ? ErrorCode::not_found : ErrorCode::system, "open " + path, error);
+    return failure(none ? ErrorCode::not_found : ErrorCode::system, "cannot open " + path, error);
   }
   struct stat status{};
-  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "look at " + path));
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
   if (!S_ISREG(status.st_mode) || (status.st_uid != ::geteuid() && status.st_uid != 0)) {
     return failure(ErrorCode::refused,
                    fmt::format("{} is no file of this user, but of user {}", path, status.st_uid));
   }
   std::string text(most + 1, '\0');
-  PLCHOST_TRY_ASSIGN(const auto got, check_errno(::read(fd.get(), text.data(), text.size()), "read " + path));
+  PLCHOST_TRY_ASSIGN(const auto got,
+                     check_errno(::read(fd.get(), text.data(), text.size()), "cannot read " + path));
   text.resize(static_cast<std::size_t>(got));
   return text;
 }

@@ -48,7 +48,7 @@ Result<void> carry_out_order(const WishOrder& order) {
   std::error_code error;
   if (!order.from.empty() && !std::filesystem::exists(order.from, error)) {
     std::filesystem::remove(path, error);
-    if (error) return failure(ErrorCode::system, "remove " + order.path, error.value());
+    if (error) return failure(ErrorCode::system, "cannot remove " + order.path, error.value());
     return sync_directory(path.parent_path());
   }
   std::string text = order.text;

@@ -27,9 +27,9 @@ bool takes_more(int fd) noexcept {
 // Each by its own open(): an application may change the flags of its standard output.
 Result<UniqueFd> open_end(const std::string& path, int flags) {
   UniqueFd fd(::open(path.c_str(), flags | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));  // NOLINT: variadic
-  PLCHOST_TRY(check_errno(fd.get(), "open " + path));
+  PLCHOST_TRY(check_errno(fd.get(), "cannot open " + path));
   struct stat status{};
-  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "fstat " + path));
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
   if (!S_ISFIFO(status.st_mode)) return failure(ErrorCode::wrong_type, path + " is no pipe");
   return fd;
 }
@@ -51,7 +51,7 @@ Result<UniqueFd> InstanceOutput::open_for_process() {
   if (!read_end_) {
     ::unlink(path().c_str());
     constexpr mode_t kOwnerOnly = 0600;
-    PLCHOST_TRY(check_errno(::mkfifo(path().c_str(), kOwnerOnly), "make the pipe " + path()));
+    PLCHOST_TRY(check_errno(::mkfifo(path().c_str(), kOwnerOnly), "cannot create the pipe " + path()));
     PLCHOST_TRY(open_ends());
   }
   // To read, too: so the pipe outlives the manager.
@@ -124,8 +124,8 @@ void InstanceOutput::forward(std::string_view bytes) {
   }
   not_forwarded_ += bytes.size();
   if (not_forwarded_ == 0 || !bytes.empty()) return;
-  spdlog::warn("instance {}: {} bytes that it said are not here; see plcctl logs", settings_.instance,
-               std::exchange(not_forwarded_, 0));
+  spdlog::warn("instance {0}: {1} bytes of output were dropped from this log; 'plcctl logs {0}' has them",
+               settings_.instance, std::exchange(not_forwarded_, 0));
 }
 
 }  // namespace plchost

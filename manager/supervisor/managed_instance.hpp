@@ -148,7 +148,7 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] bool gone() const noexcept { return removed_ && phase_ == Phase::down && !operation_; }
   /// The remains of an earlier manager are known.
   [[nodiscard]] bool known() const noexcept { return earlier_.has_value(); }
-  /// Looks at what the process says of itself. To be called now and then.
+  /// Reads the page of the process. To be called periodically.
   void refresh();
 
   [[nodiscard]] const InstanceStatus& status() const noexcept { return status_; }
@@ -380,7 +380,7 @@ inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
 inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
 /// 8 s for the set-up of the new version, 6 s for a moment in which no task is in a cycle.
 inline constexpr Duration kChangeLimit = std::chrono::seconds(18);
-/// The process's page is believed only this long after its own answer: it is written now and then.
+/// The process's page is believed only this long after its own answer: it is written periodically.
 inline constexpr Duration kPageLag = std::chrono::seconds(1);
 
 }  // namespace plchost

@@ -15,7 +15,7 @@
 namespace plchost {
 
 /// The real InstanceHost: one instance's process, with its pidfd, report channel and control socket, in the
-/// Reactor. Every exit is reaped in one place, after what the process said before it was heard.
+/// Reactor. Every exit is reaped in one place, after the manager has read the last messages of the process.
 class ProcessHost : public InstanceHost {
  public:
   struct Settings {

@@ -13,10 +13,10 @@ namespace plchost {
 // ==========================================
 //
 // decide() is the one place. Its table lists each way in which an instance ends or cannot begin, and what the
-// manager does under each restart policy. These rules are stronger than the policy, the first one most:
+// manager does under each restart policy. These rules override the policy, and each rule those below it:
 //
-//   1. A new application that does not come up gives way to the one that ran before it.
-//   2. An operator's stop is stronger than any start but an operator's. An instance that an operator stopped
+//   1. If a new application does not come up, the manager starts the one that ran before it.
+//   2. An operator's stop overrides any start but an operator's. An instance that an operator stopped
 //      while it had no process stays without one. An application that an operator stopped stays stopped in
 //      each new process.
 //   3. The manager restarts no instance that was removed from the configuration.
@@ -40,7 +40,7 @@ enum class EndCause : std::uint8_t {
   start_transient,    ///< the host was short of something, or a lock was held
   declaration_taken,  ///< another process has an output or a node address that the start needs
   name_taken,         ///< a process of that name is there already
-  // The process is there, but its application does not run, or nobody can tell.
+  // The process is there, but its application does not run, or its state is not known.
   exception,            ///< a fault has stopped the application
   silent,               ///< the control thread does not answer
   adoption_unanswered,  ///< an adopted process does not answer

@@ -47,7 +47,7 @@ class Supervisor : public ControlHandler {
   void shut_down(std::function<void()> done);
   /// Calls `done` when the wishes of all instances are on the disk, or cannot be; possibly at once.
   void when_kept(const std::function<void()>& done);
-  /// To be called now and then: see ManagedInstance::refresh.
+  /// To be called periodically: see ManagedInstance::refresh.
   void refresh();
 
   /// Of all instances, those that were removed included.

@@ -64,7 +64,7 @@ Result<void> prepare(SpawnActions& actions, const SpawnRequest& request) {
   // A session of its own: neither Ctrl-C nor the end of the manager's terminal reaches a PLC.
   constexpr int kFlags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSID;
   if (error == 0) error = posix_spawnattr_setflags(&actions.attributes, static_cast<short>(kFlags));
-  return check_returned(error, "prepare to start " + request.arguments.front());
+  return check_returned(error, "cannot prepare to start " + request.arguments.front());
 }
 
 // The number of the session stays that of its leader while anybody is in it.
@@ -99,7 +99,7 @@ Result<ChildProcess> spawn_process(const SpawnRequest& request) {
   pid_t pid = 0;
   const int error =
       ::posix_spawn(&pid, pointers.front(), &actions.files, &actions.attributes, pointers.data(), environ);
-  PLCHOST_TRY(check_returned(error, "start " + request.arguments.front()));
+  PLCHOST_TRY(check_returned(error, "cannot start " + request.arguments.front()));
   auto opened = open_process(pid);
   if (!opened) {
     // Without a pidfd it could not be supervised. It was not waited for yet, so the number is still its own.
@@ -111,7 +111,7 @@ Result<ChildProcess> spawn_process(const SpawnRequest& request) {
 
 Result<ChildProcess> open_process(pid_t pid) {
   const auto fd = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));  // CLOEXEC always
-  PLCHOST_TRY(check_errno(fd, fmt::format("pidfd_open of process {}", pid)));
+  PLCHOST_TRY(check_errno(fd, fmt::format("cannot open process {}", pid)));
   return ChildProcess{.pid = pid, .pidfd = UniqueFd(fd)};
 }
 
@@ -150,23 +150,24 @@ void kill_and_reap(const ChildProcess& process) noexcept {
 Result<void> signal_process(const ChildProcess& process, int signal) {
   const long sent = ::syscall(SYS_pidfd_send_signal, process.pidfd.get(), signal, nullptr, 0);
   if (sent != 0 && errno == ESRCH) return {};
-  PLCHOST_TRY(check_errno(sent, fmt::format("signal {} to process {}", signal, process.pid)));
+  PLCHOST_TRY(check_errno(sent, fmt::format("cannot signal {} to process {}", signal, process.pid)));
   return {};
 }
 
 Result<ReportChannel> make_report_channel() {
   std::array<int, 2> fds{};
-  PLCHOST_TRY(check_errno(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds.data()), "socketpair"));
+  PLCHOST_TRY(check_errno(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds.data()),
+                          "cannot create a pair of sockets"));
   ReportChannel channel{.ours = PacketSocket(UniqueFd(fds[0])), .childs = UniqueFd(fds[1])};
-  PLCHOST_TRY(check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl"));
+  PLCHOST_TRY(check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "cannot set the flags of a descriptor"));
   return channel;
 }
 
 Result<OutputPipe> make_output_pipe() {
   std::array<int, 2> fds{};
-  PLCHOST_TRY(check_errno(::pipe2(fds.data(), O_CLOEXEC), "pipe2"));
+  PLCHOST_TRY(check_errno(::pipe2(fds.data(), O_CLOEXEC), "cannot create a pipe"));
   OutputPipe pipe{.read_end = UniqueFd(fds[0]), .write_end = UniqueFd(fds[1])};
-  PLCHOST_TRY(check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl"));
+  PLCHOST_TRY(check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "cannot set the flags of a descriptor"));
   return pipe;
 }
 

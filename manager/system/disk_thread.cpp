@@ -59,7 +59,7 @@ Result<void> DiskThread::start() {
     error = thrown.code();
   }
   ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  if (error) return failure(ErrorCode::system, "start a thread", error.value());
+  if (error) return failure(ErrorCode::system, "cannot start a thread", error.value());
   shared_ = std::move(shared);
   return {};
 }

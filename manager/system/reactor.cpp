@@ -29,7 +29,7 @@ void Reactor::Watch::reset() noexcept {
 Result<void> Reactor::Watch::change(std::uint32_t epoll_events) {
   epoll_event event{.events = epoll_events, .data = {.u64 = id_}};
   const auto done =
-      check_errno(::epoll_ctl(reactor_->epoll_.get(), EPOLL_CTL_MOD, fd_, &event), "change watch");
+      check_errno(::epoll_ctl(reactor_->epoll_.get(), EPOLL_CTL_MOD, fd_, &event), "cannot change a watch");
   if (!done) return std::unexpected(done.error());
   return {};
 }
@@ -45,14 +45,15 @@ void Reactor::Timer::cancel() noexcept {
 }
 
 Result<std::unique_ptr<Reactor>> Reactor::create() {
-  PLCHOST_TRY_ASSIGN(auto epoll, check_errno(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1"));
+  PLCHOST_TRY_ASSIGN(auto epoll,
+                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "cannot create an epoll descriptor"));
   return std::unique_ptr<Reactor>(new Reactor(UniqueFd(epoll)));  // NOLINT: the constructor is private
 }
 
 Result<Reactor::Watch> Reactor::watch(int fd, std::uint32_t epoll_events, Ready ready) {
   const std::uint64_t id = next_id_++;
   epoll_event event{.events = epoll_events, .data = {.u64 = id}};
-  PLCHOST_TRY(check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "watch descriptor"));
+  PLCHOST_TRY(check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "cannot watch a descriptor"));
   watches_.emplace(id, std::make_unique<Ready>(std::move(ready)));
   return Watch(*this, id, fd);
 }
@@ -69,10 +70,12 @@ Result<void> Reactor::watch_signals(std::initializer_list<int> signals, std::fun
   sigset_t set;
   sigemptyset(&set);
   for (const int signal : signals) sigaddset(&set, signal);
-  if (auto blocked = check_returned(pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"); !blocked) {
+  if (auto blocked = check_returned(pthread_sigmask(SIG_BLOCK, &set, nullptr), "cannot block signals");
+      !blocked) {
     return blocked;
   }
-  PLCHOST_TRY_ASSIGN(auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd"));
+  PLCHOST_TRY_ASSIGN(auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK),
+                                          "cannot create a signal descriptor"));
   signal_fd_ = UniqueFd(fd);
   auto added = watch(fd, EPOLLIN, [this, received = std::move(received)](std::uint32_t) {
     signalfd_siginfo info{};
@@ -111,7 +114,7 @@ Result<void> Reactor::run() {
   stopped_ = false;
   while (!stopped_) {
     const int count = ::epoll_wait(epoll_.get(), events.data(), kEventsPerRound, wait_milliseconds());
-    if (count < 0 && errno != EINTR) return failure(ErrorCode::system, "epoll_wait", errno);
+    if (count < 0 && errno != EINTR) return failure(ErrorCode::system, "cannot wait for events", errno);
     for (int i = 0; i < count; ++i) {
       const epoll_event event = events[static_cast<std::size_t>(i)];
       const std::uint64_t id = event.data.u64;  // packed: no reference to it

@@ -54,7 +54,7 @@ Result<std::unique_ptr<PeriodicTimer>> LinuxClock::make_periodic_timer() {
   std::array<UniqueFd, 2> fds;
   for (UniqueFd& fd : fds) {
     PLCHOST_TRY_ASSIGN(const auto made,
-                       check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timerfd_create"));
+                       check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "cannot create a timer"));
     fd = UniqueFd(made);
   }
   return std::make_unique<TimerPair>(std::move(fds[0]), std::move(fds[1]));

@@ -195,13 +195,14 @@ Result<void> install_fault_handlers() {
   ::sigfillset(&action.sa_mask);
   action.sa_sigaction = &FaultHandlers::on_fault;
   for (const int signal : kFaultSignals) {
-    if (const auto set = check_errno(::sigaction(signal, &action, nullptr), "catch " + signal_name(signal));
+    if (const auto set =
+            check_errno(::sigaction(signal, &action, nullptr), "cannot catch " + signal_name(signal));
         !set)
       return std::unexpected(set.error());
   }
   action.sa_sigaction = &FaultHandlers::on_watchdog;
   if (const auto set =
-          check_errno(::sigaction(watchdog_signal(), &action, nullptr), "catch the watchdog's signal");
+          check_errno(::sigaction(watchdog_signal(), &action, nullptr), "cannot catch the watchdog's signal");
       !set)
     return std::unexpected(set.error());
   installed.store(true, std::memory_order_release);

@@ -84,7 +84,7 @@ Result<void> ProcessorGuard::install() {
   action.sa_flags = SA_ONSTACK | SA_RESTART;
   ::sigfillset(&action.sa_mask);
   action.sa_handler = &on_long_run;
-  PLCHOST_TRY(check_errno(::sigaction(SIGXCPU, &action, nullptr), "catch SIGXCPU"));
+  PLCHOST_TRY(check_errno(::sigaction(SIGXCPU, &action, nullptr), "cannot catch SIGXCPU"));
   guarded.store(true, std::memory_order_release);
   return {};
 }

@@ -60,9 +60,9 @@ class LinuxDeviceFiles final : public DeviceFiles {
  public:
   Result<std::unique_ptr<DeviceFile>> open(const std::string& path) override {
     UniqueFd device(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
-    if (!device) return failure(ErrorCode::unavailable, fmt::format("open {}", path), errno);
+    if (!device) return failure(ErrorCode::unavailable, fmt::format("cannot open {}", path), errno);
     UniqueFd interrupt(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!interrupt) return failure(ErrorCode::system, "eventfd", errno);
+    if (!interrupt) return failure(ErrorCode::system, "cannot create an event descriptor", errno);
     return std::make_unique<LinuxDeviceFile>(std::move(device), std::move(interrupt));
   }
 };

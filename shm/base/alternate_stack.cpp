@@ -32,10 +32,11 @@ Result<AlternateStack> AlternateStack::make() {
   const std::size_t size = usable_size() + 2 * page();
   void* const memory =
       ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
-  if (memory == MAP_FAILED) return failure(ErrorCode::system, "alternate signal stack", errno);
+  if (memory == MAP_FAILED)
+    return failure(ErrorCode::system, "cannot allocate the alternate signal stack", errno);
   AlternateStack stack(static_cast<std::byte*>(memory), size);
   for (std::byte* const guard : {stack.memory_, stack.memory_ + size - page()}) {
-    PLCHOST_TRY(check_errno(::mprotect(guard, page(), PROT_NONE), "guard of the signal stack"));
+    PLCHOST_TRY(check_errno(::mprotect(guard, page(), PROT_NONE), "cannot guard the signal stack"));
   }
   return stack;
 }

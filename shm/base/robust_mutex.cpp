@@ -119,13 +119,13 @@ LockResult RobustMutex::lock_slowly(TimePoint deadline) noexcept {
   }
 }
 
-// Gone is a thread that is not there, or that has the number of the one that took it and began later, or that
-// runs another program now. A record of another number says nothing: each owner clears its own before it
-// unlocks, and the kernel hands over what a dead one has left. A living owner is never taken from, however
-// long it takes to write its record.
+// An owner is gone if its thread is not there, or if the thread of that number began later than the owner or
+// runs another program now. A record of another number proves nothing, because each owner clears its own
+// record before it unlocks. The kernel hands over the mutex of an ended owner. A running owner keeps it,
+// however long it takes to write its record.
 //
-// The end of a large process takes long. One that is ending is as good as gone if the kernel, asked after
-// that was seen, knows of nobody to hand the mutex to.
+// The end of a large process takes long. An owner that is ending counts as gone if the kernel, asked after
+// that was seen, knows no waiter to hand the mutex to.
 RobustMutex::OwnerState RobustMutex::look_at_owner(std::uint32_t word, bool nobody_waits) const noexcept {
   const std::uint64_t record = record_.load(std::memory_order_acquire);
   const std::uint32_t image = image_.load(std::memory_order_relaxed);

@@ -167,7 +167,7 @@ Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, s
                                name, priority.fifo),
                    error);
   }
-  PLCHOST_TRY(check_returned(error, fmt::format("start thread '{}'", name)));
+  PLCHOST_TRY(check_returned(error, fmt::format("cannot start thread '{}'", name)));
   (void)info.release();  // thread_main owns it now
   thread.running_ = true;
   return thread;
@@ -176,7 +176,8 @@ Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, s
 Result<std::vector<int>> allowed_cores(pid_t thread) {
   cpu_set_t set;
   CPU_ZERO(&set);
-  PLCHOST_TRY(check_errno(::sched_getaffinity(thread, sizeof set, &set), "sched_getaffinity"));
+  PLCHOST_TRY(
+      check_errno(::sched_getaffinity(thread, sizeof set, &set), "cannot read the cores of a thread"));
   return to_cores(set);
 }
 
@@ -196,7 +197,7 @@ Result<std::vector<int>> bind_process_to_cores(pid_t pid, const std::vector<int>
   for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
     const auto thread = static_cast<pid_t>(std::strtol(entry->path().filename().c_str(), nullptr, 10));
     auto bound = check_errno(::sched_setaffinity(thread, sizeof set, &set),
-                             fmt::format("bind thread {} to core {}", thread, fmt::join(cores, ",")));
+                             fmt::format("cannot bind thread {} to core {}", thread, fmt::join(cores, ",")));
     if (!bound && bound.error().system_errno != ESRCH) return std::unexpected(bound.error());
   }
   if (error) return failure(ErrorCode::system, fmt::format("threads of process {}", process), error.value());
@@ -207,7 +208,7 @@ Result<std::vector<int>> online_cores() {
   const std::string path = "/sys/devices/system/cpu/online";
   std::ifstream file(path);
   std::string line;
-  if (!std::getline(file, line)) return failure(ErrorCode::system, "read " + path, errno);
+  if (!std::getline(file, line)) return failure(ErrorCode::system, "cannot read " + path, errno);
   auto cores = parse_cpu_list(line);
   if (!cores) return failure(ErrorCode::corrupt, fmt::format("{} holds '{}'", path, line));
   return *std::move(cores);

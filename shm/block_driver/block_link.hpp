@@ -22,8 +22,8 @@ struct NodeLife {
 };
 
 /// A link as it lies in shared memory: the queues of one direction between one run of each of two nodes.
-/// Nothing in it is ever repaired: when one of the two ends, or finds that a stranger has scribbled, a fresh
-/// one takes its place, so that nothing can stay stuck in it.
+/// Nothing in it is ever repaired: when one of the two ends, or finds that a stranger has written into it, a
+/// fresh one takes its place, so that nothing can stay stuck in it.
 struct LinkLayout {
   std::uint64_t magic = 0;
   std::uint32_t version = 0;
@@ -45,7 +45,7 @@ struct LinkLayout {
   std::atomic<std::uint32_t> broken;  ///< not 0: it asks for a fresh link
   alignas(64) std::atomic<std::uint64_t> received;
   std::atomic<std::uint64_t> damaged;  ///< blocks whose checksum or header was wrong
-  std::atomic<std::uint64_t> expired;  ///< blocks that nobody has taken in time
+  std::atomic<std::uint64_t> expired;  ///< blocks that were not taken in time
   // SlotDescriptor descriptors[kBlockPriorities][slots] and then the slots' bytes follow.
 };
 static_assert(sizeof(LinkLayout) == 320 && offsetof(LinkLayout, published) == 64);
@@ -134,7 +134,7 @@ class InLink {
   /// Drops what has waited for longer than `hold`, and asks for a fresh link if one is needed. To be called
   /// in turns of about a tenth of `hold`, by one thread. Blocks dropped.
   std::uint32_t tidy(TimePoint now, Duration hold) noexcept;
-  /// Drops all that nobody has taken: the link is given up. Blocks dropped.
+  /// Drops all blocks that were not taken: the link is given up. Returns their number.
   std::uint32_t drop_all() noexcept;
   /// Whether there is nothing left to take. Looks at each slot.
   [[nodiscard]] bool empty() const noexcept;

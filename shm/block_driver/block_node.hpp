@@ -24,7 +24,7 @@ enum class SendResult : std::uint8_t {
   sent,         ///< it lies in the queue of the next node
   congested,    ///< that queue is full; nothing was sent
   connecting,   ///< the link to the next node is being made: again in the next cycle
-  unreachable,  ///< nobody has that address, or no way leads there
+  unreachable,  ///< no node has that address, or no route leads there
   invalid,      ///< no such address, or larger than kMaxBlockSize
 };
 
@@ -32,7 +32,7 @@ enum class SendResult : std::uint8_t {
 /// router's thread.
 using RemoteSink = std::function<SendResult(const BlockHeader&, std::span<const std::byte>)>;
 /// Whether a block of so many slots for that address could be taken now. If not it stays where it is, and its
-/// sender meets congestion. Called by the router's thread.
+/// sender is told of congestion. Called by the router's thread.
 using RemoteRoom = std::function<bool(NodeAddress to, std::uint32_t slots)>;
 
 /// The longest name of a channel, bytes.
@@ -45,7 +45,7 @@ struct NodeOptions {
   NodeEntry entry;
   std::vector<std::string> neighbours = {};  ///< names of the nodes that it talks to; empty: all
   std::uint8_t hop_limit = kMaxHops;         ///< 1 to kMaxHops
-  Duration hold = std::chrono::seconds(1);   ///< a block that nobody takes is dropped after that time
+  Duration hold = std::chrono::seconds(1);   ///< a block that is not taken is dropped after that time
   std::uint16_t host_number = 0;             ///< a gateway's: how other hosts call this one; 0: it is none
   RemoteSink remote = {};                    ///< a gateway's: where blocks for other hosts go
   RemoteRoom remote_room = {};               ///< a gateway's; none: there always is
@@ -81,7 +81,7 @@ class BlockNode {
   [[nodiscard]] CountedEvent& arrivals() noexcept { return own_slot().arrivals; }
 
   /// "packer": on this host; "packer@south": on another one. Real-time. Also asks for the link that leads
-  /// there. Node 0: there is nobody of that name.
+  /// there. Node 0: there is no node of that name.
   [[nodiscard]] NodeAddress find(std::string_view name) noexcept;
   /// A block that another host sent, at the gateway that got it. invalid: also one that says that it is of
   /// this host. Any thread.
@@ -142,7 +142,7 @@ class BlockNode {
   NodeEntry entry_;                     // as it is now
   std::mutex channels_mutex_;           // set-up only
   std::map<std::uint32_t, std::string> channels_;
-  std::atomic<bool> has_channels_{false};  // so that somebody may take what is for all nodes
+  std::atomic<bool> has_channels_{false};  // so that blocks for all nodes may be taken here
 };
 
 }  // namespace plchost

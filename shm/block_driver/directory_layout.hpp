@@ -33,8 +33,8 @@ inline constexpr std::size_t kMaxHostRanges = 16;
 /// The owner of an address.
 struct NodeRecord {
   FixedText<kMaxInstanceName> name;  ///< kept when the node goes: it gets the same address again
-  ProcessIdentity process;           ///< pid 0: nobody has it
-  std::uint32_t generation = 0;      ///< of the last one who had it
+  ProcessIdentity process;           ///< pid 0: the address is free
+  std::uint32_t generation = 0;      ///< of the last node that had it
   std::uint32_t forwards = 0;        ///< 1: blocks between others may go through it
   std::uint32_t queue_slots = 0;     ///< of the links that it makes
   std::array<HostRange, kMaxHostRanges> hosts{};
@@ -47,7 +47,7 @@ struct NodeCounters {
   std::atomic<std::uint64_t> loops;        ///< had been here before, or came too far
   std::atomic<std::uint64_t> duplicates;   ///< of a block for all nodes, that came on a second way
   std::atomic<std::uint64_t> congested;    ///< had to be dropped: the next queue was full
-  std::atomic<std::uint64_t> expired;      ///< nobody took them in time
+  std::atomic<std::uint64_t> expired;      ///< blocks that were not taken in time
   std::atomic<std::uint64_t> unconnected;  ///< sent when there was no link yet
   std::atomic<std::uint64_t> refused;      ///< a gateway's: came from another host and were not valid
   std::atomic<std::uint64_t> lost;         ///< a gateway's: were on their way between hosts and never came

@@ -26,14 +26,14 @@ Result<DirectoryLock> DirectoryLock::acquire(const std::string& name) {
   UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (!fd) {
     const int error = errno;
-    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, fmt::format("open {}", path),
-                   error);
+    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system,
+                   fmt::format("cannot open {}", path), error);
   }
   const TimePoint deadline = MonotonicClock::now() + kLockPatience;
   while (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
     if (error != EWOULDBLOCK && error != EINTR) {
-      return failure(ErrorCode::system, fmt::format("lock {}", path), error);
+      return failure(ErrorCode::system, fmt::format("cannot lock {}", path), error);
     }
     if (MonotonicClock::now() >= deadline) {
       return failure(ErrorCode::timed_out,

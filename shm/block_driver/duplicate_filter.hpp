@@ -7,7 +7,7 @@
 
 namespace plchost {
 
-/// Remembers which blocks for all nodes have come already. Bounded: of the sources that were heard last, and
+/// Remembers which blocks for all nodes have come already. Bounded: of the newest sources, and
 /// of each and each priority (one overtakes the other) the last 64 numbers. One soft thread.
 class DuplicateFilter {
  public:

@@ -54,7 +54,7 @@ class LinkGate {
     collect();
     return true;
   }
-  /// Lets go of what nobody uses any more.
+  /// Frees links that are not used any more.
   void collect() noexcept {
     if (!retired_.empty() && users_.load(std::memory_order_seq_cst) == 0) retired_.clear();
   }

@@ -21,7 +21,7 @@ struct NodeAddress {
   static constexpr std::uint16_t kAllHosts = 0xffff;
 
   std::uint16_t host = 0;  ///< 0: this host
-  std::uint16_t node = 0;  ///< 1 to kMaxNodes, or kAllNodes; 0: nobody
+  std::uint16_t node = 0;  ///< 1 to kMaxNodes, or kAllNodes; 0: no node
 
   [[nodiscard]] constexpr bool to_all() const noexcept { return node == kAllNodes; }
   /// Whether it can name a node (or all of them).

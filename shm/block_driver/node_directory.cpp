@@ -36,7 +36,7 @@ Result<MemoryFile> open_or_make_directory(const std::string& name) {
     return replace ? MemoryFile::replace(name, sizeof(DirectoryLayout), fill_directory)
                    : MemoryFile::create(name, sizeof(DirectoryLayout), fill_directory);
   };
-  // Not a file of those who run nodes here, or no file at all, gives way. A header is mended below.
+  // Foreign files and non-files of this name are replaced. A header is mended below.
   return open_or_make(open, make, Replaces::foreign);
 }
 
@@ -256,7 +256,7 @@ Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
                                entry.queue_slots, kMinRingSlots, kMaxRingSlots));
   }
   const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
-  if (!lock) return failure_in("join the directory of nodes", lock.error());
+  if (!lock) return failure_in("cannot join the directory of nodes", lock.error());
   reclaim_locked();
   PLCHOST_TRY_ASSIGN(const auto node, choose(entry));
   NodeSlot& place = slot(node);

@@ -40,18 +40,19 @@ class NodeDirectory {
   static void remove(std::string_view pool, std::string_view base = kDefaultBlockBase) noexcept;
 
   /// Takes an address for this process: the forced one, or the one that the name had before, or a free one
-  /// from the upper half of the numbers first. already_exists: the address or the name is taken; says by
-  /// whom. full: all addresses are taken.
+  /// from the upper half of the numbers first. already_exists: the address or the name is taken; the
+  /// text names the process that has it. full: all addresses are taken.
   [[nodiscard]] Result<NodeLife> join(const NodeEntry& entry);
   /// Gives the address back.
   void leave(const NodeLife& life);
   /// Writes the record of a node of this process again if it is not what it should be, and what the directory
   /// says of itself.
   void keep(const NodeLife& life, const NodeEntry& entry);
-  /// Takes the addresses from nodes whose processes have ended, and removes their links. How many it were.
+  /// Takes the addresses from nodes whose processes have ended, and removes their links. Returns the number
+  /// of these nodes.
   std::uint32_t reclaim();
 
-  /// Nothing: nobody has the address, or the record is not valid. Any context.
+  /// Nothing: the address is free, or the record is not valid. Any context.
   [[nodiscard]] std::optional<NodeRecord> record(std::uint16_t node) const noexcept;
   /// Any context: looks at all of them.
   [[nodiscard]] std::optional<std::uint16_t> find(std::string_view name) const noexcept;

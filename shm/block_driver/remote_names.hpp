@@ -37,7 +37,7 @@ class RemoteNames {
 
   /// Takes the place of all that was there; names beyond kMost are left out. One writer, a soft thread.
   void write(std::span<const RemoteNode> nodes) noexcept;
-  /// `text`: "NAME@HOST". Nothing: it is not of that form, or nobody is called so. Any context: looks at up
+  /// `text`: "NAME@HOST". Nothing: it is not of that form, or there is no such node. Any context: looks at up
   /// to kMost numbers.
   [[nodiscard]] std::optional<NodeAddress> find(std::string_view text) const noexcept;
 

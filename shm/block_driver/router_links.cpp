@@ -108,8 +108,7 @@ void BlockRouter::publish_host_routes() {
   }
 }
 
-// Links to those who are gone, or have begun a new life, lead nowhere. Blocks that have come from them are
-// still taken.
+// Links to processes that ended or restarted are stale. Blocks that have come from them are still taken.
 void BlockRouter::drop_stale_links() {
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
     const bool linked = node == node_.life_.node || topology_.neighbours(node_.life_.node, node);

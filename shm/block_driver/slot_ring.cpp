@@ -127,7 +127,7 @@ RingReader::Found RingReader::look(std::uint64_t at) const noexcept {
     return found;
   }
   const std::uint32_t slots = slots_at(memory_, at);
-  // Not written yet, or by somebody who is not the writer. A block may begin at any slot behind it.
+  // Not written yet, or not by the writer of this ring. A block may begin at any slot behind it.
   if (slots == 0) return found;
   found.step = slots;
   found.published = true;

@@ -56,18 +56,18 @@ struct RingMemory {
   std::uint32_t slots = 0;     ///< is_ring_size()
 };
 
-/// Blocks that lie in a row from the head on, as one who only looks sees them. Any context.
+/// Blocks that lie in a row from the head on, as a process that only looks sees them. Any context.
 [[nodiscard]] std::uint64_t count_waiting(const RingMemory& ring) noexcept;
 
 enum class PutResult : std::uint8_t {
   put,
   full,    ///< no room; nothing was put
-  broken,  ///< the reader's end is impossible: a stranger scribbled there
+  broken,  ///< the reader's end is impossible: a stranger wrote there
 };
 
 /// The end at which blocks are put in: one process, any number of its threads at once. A thread takes its
 /// slots with one compare-and-swap and then fills them; another one may overtake it meanwhile. So a thread
-/// that is interrupted, or has a long block, delays nobody. All functions are real-time.
+/// that is interrupted, or has a long block, delays no other. All functions are real-time.
 class RingWriter {
  public:
   explicit RingWriter(const RingMemory& memory) noexcept : memory_(memory) {}
@@ -95,7 +95,7 @@ enum class TakeResult : std::uint8_t {
 
 /// The end at which blocks are taken out: one process, any number of its threads at once, each of which takes
 /// what is for it. A block goes to the thread that marks it, in memory of this process, with one
-/// compare-and-swap; blocks that nobody has marked yet do not hinder those behind them. All functions are
+/// compare-and-swap; unmarked blocks do not hinder those behind them. All functions are
 /// real-time but for the constructor.
 class RingReader {
  public:
@@ -125,10 +125,10 @@ class RingReader {
     return TakeResult::none;
   }
 
-  /// Drops all blocks that nobody has taken and that lie before `end`. How many it were.
+  /// Drops all blocks before `end` that were not taken. Returns their number.
   std::uint32_t drop_until(std::uint64_t end) noexcept;
 
-  /// Blocks that are in the ring and that nobody has taken, as the writer says; may be wrong for a moment.
+  /// Blocks in the ring that were not taken, as the writer says; may be wrong for a moment.
   [[nodiscard]] std::int64_t waiting() const noexcept {
     return static_cast<std::int64_t>(memory_.published->load(std::memory_order_acquire) -
                                      taken_.load(std::memory_order_relaxed));
@@ -151,7 +151,7 @@ class RingReader {
   struct Found {
     std::uint64_t at = 0;
     std::uint32_t step = 1;
-    bool published = false;  ///< a block begins there, and nobody has marked it
+    bool published = false;  ///< a block begins there, and it is not marked
     bool mine = false;       ///< a thread of this process has marked it
     BlockTag tag = {};
     std::uint64_t mark = 0;

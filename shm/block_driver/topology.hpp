@@ -26,8 +26,8 @@ class Topology {
   [[nodiscard]] std::array<std::uint16_t, kMaxNodes> next_hops(std::uint16_t from) const;
   /// The links to each node; 0: it is `from` itself, or there is no way.
   [[nodiscard]] std::array<std::uint8_t, kMaxNodes> distances(std::uint16_t from) const;
-  /// To whom `self` passes on a block for all nodes that comes from `root`: along one tree, so that each node
-  /// gets it once.
+  /// The nodes to which `self` passes on a block for all nodes that comes from `root`: along one tree, so
+  /// that each node gets it once.
   [[nodiscard]] NodeSet children(std::uint16_t root, std::uint16_t self) const;
 
  private:

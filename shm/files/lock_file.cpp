@@ -16,7 +16,7 @@ constexpr mode_t kForOthersToWrite = S_IWGRP | S_IWOTH;
 
 Result<void> check_ours(int fd, const std::string& path) {
   struct stat status{};
-  if (::fstat(fd, &status) != 0) return failure(ErrorCode::system, "fstat " + path, errno);
+  if (::fstat(fd, &status) != 0) return failure(ErrorCode::system, "cannot examine " + path, errno);
   const bool trusted = status.st_uid == 0 || status.st_uid == ::geteuid();
   if (S_ISREG(status.st_mode) && trusted && (status.st_mode & kForOthersToWrite) == 0) return {};
   return failure(ErrorCode::refused,
@@ -60,13 +60,13 @@ Result<LockFile> LockFile::take(const std::string& path) {
     UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kOwnersMode));
     if (!fd) {
       const int error = errno;
-      return failure(code_of(error), "open " + path, error);
+      return failure(code_of(error), "cannot open " + path, error);
     }
     PLCHOST_TRY(check_ours(fd.get(), path));
     struct flock lock = whole_file();
     if (::fcntl(fd.get(), F_SETLK, &lock) != 0) {
       const int error = errno;
-      if (error != EAGAIN && error != EACCES) return failure(ErrorCode::system, "lock " + path, error);
+      if (error != EAGAIN && error != EACCES) return failure(ErrorCode::system, "cannot lock " + path, error);
       return failure(ErrorCode::already_exists, fmt::format("{} holds {}", holder_of(fd.get()), path));
     }
     if (is_current(fd.get(), path)) return LockFile(std::move(fd), path);

@@ -46,7 +46,7 @@ Result<GuardedMapping> map(const UniqueFd& fd, std::size_t size, MemoryFile::Acc
   void* const address = ::mmap(nullptr, size, protection, MAP_SHARED, fd.get(), 0);
   if (address == MAP_FAILED) {
     const int error = errno;
-    return failure(ErrorCode::system, fmt::format("map {} bytes of {}", size, path), error);
+    return failure(ErrorCode::system, fmt::format("cannot map {} bytes of {}", size, path), error);
   }
   return GuardedMapping(std::span(static_cast<std::byte*>(address), size));
 }
@@ -64,7 +64,7 @@ Result<void> allocate(const UniqueFd& fd, std::size_t size, const std::string& p
                     size, path, MemoryFile::kDirectory),
         error);
   }
-  return check_returned(error, fmt::format("allocate {} bytes for {}", size, path));
+  return check_returned(error, fmt::format("cannot allocate {} bytes for {}", size, path));
 }
 
 Result<UniqueFd> make_nameless(std::size_t size, const MemoryRights& rights, const std::string& path) {
@@ -76,7 +76,8 @@ Result<UniqueFd> make_nameless(std::size_t size, const MemoryRights& rights, con
   UniqueFd fd(::open(MemoryFile::kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, S_IRUSR | S_IWUSR));
   if (!fd) {
     const int error = errno;
-    return failure(ErrorCode::system, fmt::format("make shared memory in {}", MemoryFile::kDirectory), error);
+    return failure(ErrorCode::system,
+                   fmt::format("cannot create shared memory in {}", MemoryFile::kDirectory), error);
   }
   PLCHOST_TRY(give_rights(fd.get(), rights, path));
   PLCHOST_TRY(allocate(fd, size, path));
@@ -88,7 +89,7 @@ Result<void> link_to(const UniqueFd& fd, const std::string& path) {
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0) return {};
   const int error = errno;
   if (error == EEXIST) return failure(ErrorCode::already_exists, fmt::format("{} exists already", path));
-  return failure(ErrorCode::system, fmt::format("give shared memory the name {}", path), error);
+  return failure(ErrorCode::system, fmt::format("cannot give shared memory the name {}", path), error);
 }
 
 ErrorCode code_of_open(int error) noexcept {
@@ -128,9 +129,9 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access,
     if (::lstat(path.c_str(), &opened.status) == 0 && !S_ISREG(opened.status.st_mode)) {
       return not_a_plain_file(path, opened.status.st_mode);
     }
-    return failure(code_of_open(error), fmt::format("open {}", path), error);
+    return failure(code_of_open(error), fmt::format("cannot open {}", path), error);
   }
-  PLCHOST_TRY(check_errno(::fstat(opened.fd.get(), &opened.status), "fstat " + path));
+  PLCHOST_TRY(check_errno(::fstat(opened.fd.get(), &opened.status), "cannot examine " + path));
   if (!S_ISREG(opened.status.st_mode)) {
     return not_a_plain_file(path, opened.status.st_mode);
   }
@@ -151,7 +152,7 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
   PLCHOST_TRY_ASSIGN(auto path, path_of(name));
   PLCHOST_TRY_ASSIGN(auto fd, make_nameless(size, rights, path));
   struct stat status{};
-  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "fstat " + path));
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
   PLCHOST_TRY_ASSIGN(auto mapping, map(fd, size, MemoryFile::Access::read_write, path));
   return UnnamedMemory(std::move(path), std::move(fd), MemoryFile(std::move(mapping), status.st_ino));
 }

@@ -79,11 +79,11 @@ Result<void> give_rights(int fd, const MemoryRights& rights, const std::string& 
       ::fchown(fd, rights.owner.value_or(kSame), rights.group.value_or(kSame)) != 0) {
     const int error = errno;
     return failure(error == EPERM ? ErrorCode::refused : ErrorCode::system,
-                   fmt::format("give {} to owner {} and group {}", path, rights.owner.value_or(::geteuid()),
-                               rights.group.value_or(::getegid())),
+                   fmt::format("cannot give {} to owner {} and group {}", path,
+                               rights.owner.value_or(::geteuid()), rights.group.value_or(::getegid())),
                    error);
   }
-  PLCHOST_TRY(check_errno(::fchmod(fd, rights.mode), "fchmod " + path));
+  PLCHOST_TRY(check_errno(::fchmod(fd, rights.mode), "cannot set the rights of " + path));
   return {};
 }
 

@@ -12,7 +12,8 @@ Result<void> check_own_folder(const std::string& path) {
   struct stat status{};
   if (::stat(path.c_str(), &status) != 0) {
     const int error = errno;
-    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, "stat " + path, error);
+    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, "cannot examine " + path,
+                   error);
   }
   const bool trusted = status.st_uid == 0 || status.st_uid == ::geteuid();
   if (trusted && (status.st_mode & S_IWOTH) == 0) return {};

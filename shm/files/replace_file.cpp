@@ -15,15 +15,15 @@ namespace {
 Result<void> write_all(const std::string& path, std::string_view text, mode_t mode) {
   // A left-over of a run before this one may have other rights.
   if (::unlink(path.c_str()) != 0 && errno != ENOENT)
-    return failure(ErrorCode::system, "remove " + path, errno);
+    return failure(ErrorCode::system, "cannot remove " + path, errno);
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
-  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
   while (!text.empty()) {
     PLCHOST_TRY_ASSIGN(const auto written,
-                       check_errno(::write(fd.get(), text.data(), text.size()), "write " + path));
+                       check_errno(::write(fd.get(), text.data(), text.size()), "cannot write " + path));
     text.remove_prefix(static_cast<std::size_t>(written));
   }
-  PLCHOST_TRY(check_errno(::fsync(fd.get()), "fsync " + path));
+  PLCHOST_TRY(check_errno(::fsync(fd.get()), "cannot sync " + path));
   return {};
 }
 
@@ -31,8 +31,8 @@ Result<void> write_all(const std::string& path, std::string_view text, mode_t mo
 
 Result<void> sync_directory(const std::string& path) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
-  PLCHOST_TRY(check_errno(::fsync(fd.get()), "fsync " + path));
+  if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
+  PLCHOST_TRY(check_errno(::fsync(fd.get()), "cannot sync " + path));
   return {};
 }
 
@@ -44,7 +44,7 @@ Result<void> replace_file(const std::string& path, std::string_view text, mode_t
   }
   std::error_code error;
   std::filesystem::rename(fresh, path, error);
-  if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());
+  if (error) return failure(ErrorCode::system, "cannot rename " + fresh, error.value());
   return {};
 }
 

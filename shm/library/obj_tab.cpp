@@ -129,7 +129,7 @@ Result<ObjTab*> ObjTab::of_this_process() {
   static pid_t owner = 0;
   static const int survives_fork =
       ::pthread_atfork([] { making.lock(); }, [] { making.unlock(); }, [] { making.unlock(); });
-  if (survives_fork != 0) return failure(ErrorCode::system, "pthread_atfork", survives_fork);
+  if (survives_fork != 0) return failure(ErrorCode::system, "cannot watch for forks", survives_fork);
   const std::lock_guard one_at_a_time(making);
   if (table == nullptr || owner != ::getpid()) {
     PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::attach(pool_name_of(nullptr)));

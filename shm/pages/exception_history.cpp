@@ -105,7 +105,7 @@ Result<ExceptionHistory> read_exceptions(const std::string& path) {
     return corrupt(path, "is not a regular file");
   }
   std::ifstream file(path, std::ios::binary);
-  if (!file) return failure(ErrorCode::system, "open " + path, errno);
+  if (!file) return failure(ErrorCode::system, "cannot open " + path, errno);
   std::string text(kMaxFile + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(file.gcount()));

@@ -36,7 +36,7 @@ struct ObjectOptions {
   /// The rights to it: nothing means the caller and the pool's group (if the caller is not in that, its own).
   /// Another group than one of the caller's is refused, as with files. Permission bits as those of a file, 0
   /// are the pool's. Of a memory the kernel watches over them; of the others, which lie in the pool itself,
-  /// this library does, for all who have the right to write the pool.
+  /// this library does, for all programs with the right to write the pool.
   std::optional<gid_t> group = std::nullopt;
   mode_t mode = 0;
 };
@@ -52,7 +52,7 @@ class PoolLock;
 
 /// The changes of a pool since tidy() was called last.
 struct PoolFindings {
-  bool lost = false;  ///< its file was cut short by a stranger, and this process is alone with what it has
+  bool lost = false;  ///< its file was cut short by a stranger, and this process goes on with private memory
   std::uint32_t headers_mended = 0;  ///< so often had a stranger written over its header
   std::uint32_t rebuilds = 0;        ///< so often were lists found damaged, and made anew
   std::uint32_t lost_objects = 0;    ///< so many objects were not valid any more then
@@ -120,7 +120,7 @@ class ObjectPool {
     return create_object<SharedMutex>(name, 0, options);
   }
   /// `size` in bytes, from 1 to what the host has room for. When made it has `contents`, with zeros behind
-  /// them: nobody sees the memory without them, whatever ends this process.
+  /// them: no process sees the memory without them, whatever ends this process.
   [[nodiscard]] Result<Created<SharedMemory>> create_memory(std::string_view name, std::size_t size,
                                                             const ObjectOptions& options = {},
                                                             std::span<const std::byte> contents = {});
@@ -155,7 +155,7 @@ class ObjectPool {
   /// One of them. not_found.
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
-  /// Releases the references of dead clients, mends the damage of strangers, and makes objects of the
+  /// Releases the references of ended clients, mends the damage of strangers, and makes objects of the
   /// memories that firmware has made with a header alone (see PoolAdoption). It does so without waiting for
   /// the next call of any client. Ends after some 20 ms if there is much to release, or another one holds the
   /// lock: the rest is for the next time. For the process that watches over the host, from one thread.

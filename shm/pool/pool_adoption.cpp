@@ -198,11 +198,11 @@ Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, PoolLock& hel
                     "wait for that",
                     name, path, left->owner.load(kRelaxed), MemoryFile::kDirectory));
   }
-  if (::ftruncate(fd.get(), 0) != 0) return failure(ErrorCode::system, "empty " + path, errno);
+  if (::ftruncate(fd.get(), 0) != 0) return failure(ErrorCode::system, "cannot empty " + path, errno);
   if (const int error = ::posix_fallocate(fd.get(), 0, static_cast<off_t>(size)); error != 0) {
     return failure(ErrorCode::full, fmt::format("{} bytes of shared memory for {}", size, path), error);
   }
-  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat " + path, errno);
+  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "cannot examine " + path, errno);
   describe_as(*left, status, attributes);
   return left;
 }

@@ -19,7 +19,7 @@ namespace plchost {
 /// Where the pool's table and the files of its memories disagree. Firmware that knows only a C header
 /// (shm/plc_process_image.h, shm/plc_reference_clock.h) makes a file without an entry: it becomes a kept
 /// object, with the rights of the file. Somebody removes a file: its entry goes. A file of another user
-/// cannot be removed from the sticky folder: its entry stays, unseen, until somebody can, or it is used
+/// cannot be removed from the sticky folder: its entry stays, unseen, until a process can, or it is used
 /// again.
 ///
 /// Only a file that says what it is, and whose owner may write the pool, is taken. Set-up.
@@ -27,7 +27,7 @@ class PoolAdoption {
  public:
   explicit PoolAdoption(std::shared_ptr<PoolSegment> segment) noexcept : segment_(std::move(segment)) {}
 
-  /// For a call that has not found a memory, or not its file: sets right what is wrong with it. True: look
+  /// For a call that has not found a memory, or not its file: repairs the entry or the file. True: look
   /// again. Waits up to 20 ms for a file that is just being made.
   [[nodiscard]] static bool reconcile(PoolSegment& segment, std::string_view name);
 
@@ -39,7 +39,7 @@ class PoolAdoption {
   /// The entry is that of a memory that has gone, whose file could not be removed.
   [[nodiscard]] static bool is_left_over(const ObjectEntry& entry) noexcept;
   /// Removes it, or makes its file one of `size` zeros again, with `attributes`; null: it
-  /// was removed. refused: neither is possible; says who can do what.
+  /// was removed. refused: neither is possible; the text names the users that can do it.
   [[nodiscard]] static Result<ObjectEntry*> use_again(PoolSegment& segment, PoolLock& held,
                                                       ObjectEntry& entry, std::size_t size,
                                                       const MemoryRights& rights, std::uint32_t attributes);

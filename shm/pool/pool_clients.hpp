@@ -24,7 +24,7 @@ class PoolClients {
   /// False: `bury` has said so.
   bool sweep(TimePoint now, bool thoroughly, const std::function<bool(ClientSlot&)>& bury);
 
-  /// For so long a process that is a zombie, or whose number was given to another one, passes for alive.
+  /// For so long a process that is a zombie, or whose number was given to another one, counts as running.
   static constexpr Duration kLook = std::chrono::milliseconds(10);
 
  private:

@@ -53,7 +53,7 @@ bool PoolJournal::roll_back() noexcept {
   if (noted > header_.notes.size()) return false;
   const auto sound = [this](const auto& note) { return word_of(note.load(kRelaxed)) != nullptr; };
   if (!std::all_of(header_.notes.begin(), header_.notes.begin() + noted, sound)) return false;
-  // Dying in here leaves the notes to the next one, who puts back the same.
+  // If this process is killed here, the next one rolls back the same notes.
   for (std::uint32_t i = noted; i-- > 0;) {
     const std::uint64_t note = header_.notes[i].load(kRelaxed);
     Link* const word = word_of(note);

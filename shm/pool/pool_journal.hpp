@@ -8,10 +8,11 @@
 namespace plchost {
 
 /// How the words that the pool's mutex guards are written: the old values are noted in the header first. The
-/// next process that takes the mutex after a death puts those back. So the unfinished step of the dead one
-/// has not happened: in a time that does not depend on the number of objects. All functions need the mutex.
+/// next process that takes the mutex of a killed one puts those back. So the unfinished step of the killed
+/// one has not happened: in a time that does not depend on the number of objects. All functions need the
+/// mutex.
 ///
-/// Not written this way is what nobody looks at before a word that is: the contents of a free place. Nor are
+/// Words that are read only after a noted one are not written this way: the contents of a free place. Nor are
 /// generations: that of an object may grow without a reason.
 class PoolJournal {
  public:

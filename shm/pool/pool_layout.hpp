@@ -129,7 +129,7 @@ struct alignas(64) PoolHeader {
   std::array<std::uint32_t, 4> reserved0;
 
   alignas(64) RobustMutex mutex;  ///< guards set-up only
-  /// Odd while somebody changes what the mutex guards: for readers without the right to write.
+  /// Odd while a process changes the data that the mutex guards: for readers without the right to write.
   std::atomic<std::uint64_t> changes;
   std::array<std::uint32_t, 2> reserved1;
   /// For a process that attaches when a stranger has written over the first line.

@@ -10,7 +10,7 @@ namespace {
 
 // One that is killed between its post and its wake has left the post: a waiter looks for it so often.
 constexpr Duration kLook = std::chrono::milliseconds(40);
-// Nobody wakes who could not say that he waits.
+// A waiter without a mark is not woken, so it polls each millisecond.
 constexpr Duration kUnmarkedLook = std::chrono::milliseconds(1);
 
 // A waiter without a limit looks now and then whether the object is still there.

@@ -74,7 +74,7 @@ class PoolObject {
   }
   [[nodiscard]] ObjectStatus why_not_valid() const noexcept;
   [[nodiscard]] ObjectEntry& entry() const noexcept { return *entry_; }
-  /// Somebody who waits can be marked in it, so that a poster wakes it.
+  /// A waiter can be marked in it, so that a poster wakes it.
   [[nodiscard]] bool can_be_marked() const noexcept { return reference_ != nullptr; }
 
  private:
@@ -109,8 +109,8 @@ class SharedEvent : public PoolObject {
   [[nodiscard]] PoolEvent event() const noexcept;
 };
 
-/// See CountingSemaphore: a number that any user may raise and lower; units that a dead user took stay taken.
-/// For exclusive use take a mutex.
+/// See CountingSemaphore: a number that any user may raise and lower; units that an ended user took stay
+/// taken. For exclusive use take a mutex.
 class SharedSemaphore : public PoolObject {
  public:
   static constexpr ObjectType kType = ObjectType::semaphore;

@@ -45,7 +45,7 @@ class PoolSegment {
   /// The process that changes the pool has ended over it, and none has come since. Set-up; only reads.
   [[nodiscard]] bool holder_has_ended() const noexcept { return view_.header().mutex.owner_has_ended(); }
 
-  /// Its holder finds nothing half-done. The references of dead clients are released: as many as can be
+  /// Its holder finds no unfinished step. The references of ended clients are released: as many as can be
   /// released in `kBurial` (others have their turn meanwhile), the rest is for the next one. refused: mapped
   /// to read only. wrong_state: this process is a child of the one that attached. timed_out: another one
   /// holds it for longer than `patience`. corrupt: lost, or the lock is.
@@ -58,11 +58,11 @@ class PoolSegment {
   // With the lock held, which is given as a proof.
 
   [[nodiscard]] PoolTable table(const PoolLock& /*held*/) noexcept { return {view_, journal_}; }
-  /// Null: there is none of that name, or only one that dead clients held.
+  /// Null: there is none of that name, or only one that ended clients held.
   [[nodiscard]] ObjectEntry* find(PoolLock& held, std::string_view name) noexcept;
   /// full: too many clients, or too many references.
   [[nodiscard]] Result<ReferenceEntry*> add_reference(PoolLock& held, ObjectEntry& object, bool writable);
-  /// Frees the object if nobody needs it any more.
+  /// Frees the object if no reference needs it any more.
   void drop_if_idle(PoolLock& held, ObjectEntry& object) noexcept;
   /// Frees it for any process that needs it.
   void destroy(PoolLock& held, ObjectEntry& object) noexcept;
@@ -107,7 +107,7 @@ class PoolSegment {
   ClientSlot* client_ = nullptr;  // that this client has
   std::uint32_t client_generation_ = 0;
   /// The holder of the lock when a thread of this process has waited for it in vain: it is not waited for
-  /// again as long. 0: nobody.
+  /// again as long. 0: no thread.
   std::atomic<std::uint32_t> stuck_{0};
   PoolFindings told_;
   /// The references that could not be released, since the lock was not to be had.

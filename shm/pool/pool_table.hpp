@@ -26,7 +26,7 @@ class PoolTable {
   /// it is published. Null if the table is full and nothing can be reclaimed.
   [[nodiscard]] ObjectEntry* insert(std::string_view name, ObjectType type) noexcept;
   void publish(ObjectEntry& entry) noexcept;
-  /// From here on nobody finds it, and the next process erases it if this one ends.
+  /// From here on no process finds it, and the next process erases it if this one ends.
   void withdraw(ObjectEntry& entry) noexcept;
   /// Frees it; handles on it are invalid from here on.
   void erase(ObjectEntry& entry) noexcept;
@@ -41,7 +41,7 @@ class PoolTable {
  private:
   [[nodiscard]] ObjectEntry* allocate() noexcept;
   [[nodiscard]] bool free_places_are_sane() const noexcept;
-  /// Makes a free place of one that nobody needs. False: there is none.
+  /// Makes a free place of one that is not needed. False: there is none.
   bool reclaim() noexcept;
   void set_state(ObjectEntry& entry, EntryState state) noexcept;
   void put(ObjectEntry& entry, Link& first) noexcept;

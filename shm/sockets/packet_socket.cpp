@@ -30,9 +30,9 @@ Result<sockaddr_un> to_address(const std::string& path) {
 }
 
 Result<UniqueFd> make_socket() {
-  PLCHOST_TRY_ASSIGN(
-      const auto fd,
-      check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket"));
+  PLCHOST_TRY_ASSIGN(const auto fd,
+                     check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0),
+                                 "cannot create a socket"));
   return UniqueFd(fd);
 }
 
@@ -49,7 +49,7 @@ Result<PacketSocket> PacketSocket::connect(const std::string& path) {
     const int error = errno;
     // A non-blocking connect says EAGAIN when the listener's backlog is full.
     return failure(error == EAGAIN ? ErrorCode::busy : ErrorCode::unavailable,
-                   fmt::format("connect to {}", path), error);
+                   fmt::format("cannot connect to {}", path), error);
   }
   return PacketSocket(std::move(fd));
 }
@@ -62,7 +62,8 @@ Result<void> PacketSocket::send(std::string_view packet) {
   while (::send(fd_.get(), packet.data(), packet.size(), MSG_NOSIGNAL) < 0) {
     if (errno == EINTR) continue;
     const bool full = errno == EAGAIN || errno == EWOULDBLOCK;
-    return failure(full ? ErrorCode::busy : ErrorCode::unavailable, "send on control socket", errno);
+    return failure(full ? ErrorCode::busy : ErrorCode::unavailable, "cannot send on the control socket",
+                   errno);
   }
   return {};
 }
@@ -74,7 +75,7 @@ Result<std::optional<std::string>> PacketSocket::receive() {
     length = ::recv(fd_.get(), buffer.data(), buffer.size(), 0);
   } while (length < 0 && errno == EINTR);
   if (length < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return std::nullopt;
-  if (length < 0) return failure(ErrorCode::unavailable, "receive from control socket", errno);
+  if (length < 0) return failure(ErrorCode::unavailable, "cannot receive from the control socket", errno);
   if (length == 0) return failure(ErrorCode::unavailable, "the other end of the control socket is closed");
   if (static_cast<std::size_t>(length) > kMaxPacket) {
     return failure(ErrorCode::corrupt, fmt::format("packet larger than {} bytes", kMaxPacket));
@@ -85,8 +86,8 @@ Result<std::optional<std::string>> PacketSocket::receive() {
 Result<int> PacketSocket::peer_pid() const {
   ucred credentials{};
   socklen_t size = sizeof credentials;
-  const auto got =
-      check_errno(::getsockopt(fd_.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size), "SO_PEERCRED");
+  const auto got = check_errno(::getsockopt(fd_.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size),
+                               "cannot read the peer of a socket");
   if (!got) return std::unexpected(got.error());
   return static_cast<int>(credentials.pid);
 }
@@ -97,12 +98,12 @@ Result<PacketListener> PacketListener::listen(const std::string& path) {
   ::unlink(path.c_str());
   constexpr mode_t kMode = 0660;
   constexpr int kBacklog = 16;
-  auto done = check_errno(::bind(fd.get(), as_sockaddr(address), sizeof address), "bind " + path);
-  if (done) done = check_errno(::chmod(path.c_str(), kMode), "chmod " + path);
-  if (done) done = check_errno(::listen(fd.get(), kBacklog), "listen on " + path);
+  auto done = check_errno(::bind(fd.get(), as_sockaddr(address), sizeof address), "cannot bind " + path);
+  if (done) done = check_errno(::chmod(path.c_str(), kMode), "cannot set the rights of " + path);
+  if (done) done = check_errno(::listen(fd.get(), kBacklog), "cannot listen on " + path);
   if (!done) return std::unexpected(done.error());
   struct stat file{};
-  PLCHOST_TRY(check_errno(::stat(path.c_str(), &file), "stat " + path));
+  PLCHOST_TRY(check_errno(::stat(path.c_str(), &file), "cannot examine " + path));
   return PacketListener(std::move(fd), path, file.st_ino);
 }
 
@@ -130,7 +131,7 @@ Result<std::optional<PacketSocket>> PacketListener::accept() {
   const int fd = ::accept4(fd_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd >= 0) return PacketSocket(UniqueFd(fd));
   if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNABORTED) return std::nullopt;
-  return failure(ErrorCode::system, fmt::format("accept on {}", path_), errno);
+  return failure(ErrorCode::system, fmt::format("cannot accept on {}", path_), errno);
 }
 
 }  // namespace plchost

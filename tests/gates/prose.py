@@ -6,10 +6,12 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
 * No sentence and no cell of a table begins with "who", "what", "whose", "whoever", "whatever" or "that which", unless it asks
   something. A part behind ":" or ";" or a dash is held to the same, and so is a clause behind "so", "because" and the like.
 * No clause with "what" is an object where a noun belongs: "of what is posted". Comments are not held to this one.
+* No sentence has the object of "who", a "who" behind "whether", or one that belongs to a "nobody" or "anybody" before it.
 * No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Of a sentence with one colon
-  neither half has more, and both together have at most 36. Behind a colon, the parts of a list that ";" or ":" divides are
-  counted one by one.
-* No text has a word that manager/glossary.md forbids (the column "not").
+  neither half has more, and both together have at most 36. Behind a colon, the parts that ";" or ":" divides are counted one by
+  one, and all together have at most 45. A list of more is written as a list.
+* The text of an error of the programs does not begin with an imperative: "cannot open FILE", not "open FILE".
+* No text has a word that manager/glossary.md forbids (the column "not"), nor its plural, nor its forms with -ed and -ing.
 
 A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md). So are comments, docstrings and
 the texts of pictures (.svg), and strings of three words and more in C++, Python or CMake, or printed by a shell script:
@@ -29,25 +31,38 @@ from pathlib import Path
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
 WORDS_WITH_COLON = 36
+WORDS_IN_PARTS = 45
 
 OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
-# In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`.
+# In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`, `asks nobody for it who reads`.
 WITHIN = re.compile(
-    r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but|and|or|nor|only|stop) who"
-    r"|(?:so|because|if|when|while|unless|since|but|so that) what)\b|\bwhoever\b(?!\")", re.IGNORECASE)
+    r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but|and|or|nor|only|stop|whether) who"
+    r"|(?:so|because|if|when|while|unless|since|but|so that) what|whom"
+    r"|(?:nobody|no one|anybody|everybody|somebody)\b[^.;:]*?\bwho)\b|\bwhoever\b(?!\")", re.IGNORECASE)
 # `says what is wrong` asks, `of what is wrong` does not.
 OBJECT = re.compile(r"\b(?:of|for|from|with|by|without|beside|than|takes?|adopts?) what \w", re.IGNORECASE)
-# The ends of sentences. A sentence begins with a capital letter, a digit or code.
-END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*[A-Z0-9`\u0001])")
+# The ends of sentences. A sentence begins with a capital letter, a digit, code, an option, or the name of an error and a colon.
+END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*(?:[A-Z0-9`\u0001]|--[a-z]|[a-z_]+: ))")
 PART = re.compile(r"(?<=[:;])\s+|\s+[-\u2013]\s+")
 WORD = re.compile(r"[\w'\u0001][\w'/.,\u0001-]*")
 CODE = "\u0001"  # one word of code
+# A call that makes an error. The step is its first literal.
+ERROR_CALL = re.compile(r"\b(?:failure|failure_in|openssl_failure|check_(?:errno|returned|entity|code))\(")
+CALL_PART = re.compile(r'"(?:\\.|[^"\\\n])*"|[()]')
+IMPERATIVE = re.compile(
+    r'"(accept|add|allocate|attach|bind|catch|change|choose|claim|connect|copy|create|empty|examine|filter|give|guard|join|listen|lock|look'
+    r'|make|map|open|pass|poll|post|prepare|publish|raise|reach|read|receive|remove|rename|send|set|sign|signal|start|sync|tie|wait|watch'
+    r'|write)[ "]')
 
 C_TOKEN = re.compile(
     r"""//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/|R"(?P<mark>\w*)\((?P<raw>.*?)\)(?P=mark)"|"""
     r""""(?P<text>(?:\\.|[^"\\\n])*)"|(?<![0-9a-fA-F])'(?:\\.[^'\n]*|[^'\\\n])'""", re.DOTALL)
 # Of a comment: columns, arrows, a line of usage.
 DRAWING = re.compile(r"\S   +\S|-->|──|\|  |^  +\S.*\[-")
+# Columns, a declaration in Structured Text, a line for the generators.
+NO_PROSE = re.compile(r"\S {3,}\S|\w : \w|^row: ")
+# In a comment of api/control.idl: a line for the generators.
+TAG = re.compile(r"(topic|writer|reader|qos|row|columns|list|library|order|uncounted): ")
 C_FILES = (".cpp", ".hpp", ".h", ".c", ".idl", ".h.in", ".hpp.in")
 CMAKE_FILES = (".cmake", ".cmake.in", "CMakeLists.txt")
 HASH_FILES = (*CMAKE_FILES, ".sh", ".sed", ".ci/run", ".ci/packages", ".ci/bare")
@@ -112,6 +127,10 @@ def paragraphs(lines, columns=False):
                     yield text
             text = Text()
             continue
+        if columns and TAG.match(stripped):
+            if text.lines:
+                yield text
+            text = Text()
         item = ITEM.match(stripped)
         if item and (text.lines == [] or not text.lines[-1][1].endswith((" the", " of"))):
             if text.lines:
@@ -244,6 +263,18 @@ def texts_of(name, source):
     return hash_texts(source)
 
 
+def imperatives(source):
+    """(line, literal) of each error whose text begins with an imperative."""
+    for call in ERROR_CALL.finditer(source):
+        depth = 1
+        for part in CALL_PART.finditer(source, call.end()):
+            depth += (part.group() == "(") - (part.group() == ")")
+            if not depth or part.group()[0] == '"':
+                if IMPERATIVE.match(part.group()):
+                    yield source.count("\n", 0, part.start()) + 1, part.group()
+                break
+
+
 def plain(text):
     """Code as one word, links as their text, nothing of emphasis."""
     text = re.sub(r"`+[^`]*`+", CODE, text)
@@ -277,6 +308,8 @@ def faults_of(kind, text, forbidden):
         words = len(WORD.findall(sentence))
         if len(counted) == 2 and words > WORDS_WITH_COLON:
             yield text.find(sentence), f"{words} words in a sentence with a colon, at most {WORDS_WITH_COLON}: {sentence[:50]}"
+        elif words > WORDS_IN_PARTS and not NO_PROSE.search(sentence):
+            yield text.find(sentence), f"{words} words in a sentence of parts, at most {WORDS_IN_PARTS}: {sentence[:50]}"
     for found in forbidden.finditer(text) if forbidden else ():
         yield found.start(), f"'{found[0]}' is not a word of {GLOSSARY}"
 
@@ -289,7 +322,9 @@ def forbidden_words(root):
             cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
             if len(cells) == 3 and cells[2] not in ("", "not", "-") and not cells[2].startswith("--"):
                 words += [word.strip() for word in cells[2].split(",")]
-    return re.compile(r"(?<![\w-])(?:%s)(?![\w-])" % "|".join(map(re.escape, words)), re.IGNORECASE) if words else None
+    forms = "|".join(map(re.escape, words))
+    # A last consonant is doubled before -ed: swapped.
+    return re.compile(rf"(?<![\w-])(?:{forms})(?:e?s|(?:\w?e)?d|\w?ing)?(?![\w-])", re.IGNORECASE) if words else None
 
 
 def main():
@@ -303,7 +338,11 @@ def main():
     for name in names:
         if not name.endswith((".md", ".py", ".svg", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
             continue
-        for kind, text in texts_of(name, (options.root / name).read_text(encoding="utf-8")):
+        source = (options.root / name).read_text(encoding="utf-8")
+        for line, literal in imperatives(source) if name.endswith(C_FILES) and not name.startswith(("tests/", "instances/adapters/")) else ():
+            print(f"{name}:{line}: an error begins with an imperative: {literal}")
+            wrong += 1
+        for kind, text in texts_of(name, source):
             joined = text.joined()
             read += 1
             if kind == "message" and not is_message(joined):

@@ -217,6 +217,14 @@ plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence,
 plant_in_prose "prose: who, behind an and" "shm/planted.md:1: a clause begins with 'and who'" shm/planted.md "The task waits, and who asked hears of it."
 plant_in_prose "prose: what in the place of a noun" "shm/planted.md:1: a noun instead of 'of what was posted" shm/planted.md "The manager keeps a list of what was posted."
 plant_in_prose "prose: long sentence with a colon" "shm/planted.md:1: 37 words in a sentence with a colon, at most 36" shm/planted.md "A$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..17})."
+plant_in_prose "prose: whom" "shm/planted.md:1: a clause begins with 'whom'" shm/planted.md "The log tells for whom the host posts."
+plant_in_prose "prose: whether who" "shm/planted.md:1: a clause begins with 'whether who'" shm/planted.md "The host checks whether who asks may post."
+plant_in_prose "prose: who, apart from its nobody" "shm/planted.md:1: a clause begins with 'nobody is served who'" shm/planted.md "Here nobody is served who has no key."
+plant_in_prose "prose: long sentence of parts" "shm/planted.md:1: 46 words in a sentence of parts, at most 45" shm/planted.md "A$(printf ' word%.0s' {1..15}): a$(printf ' word%.0s' {1..14}); a$(printf ' word%.0s' {1..14})."
+plant_in_prose "prose: synonym in plural" "shm/planted.md:1: 'missed cycles' is not a word of manager/glossary.md" shm/planted.md "The missed cycles are counted."
+plant_in_prose "prose: synonym with -ed" "shm/planted.md:1: 'hot swapped' is not a word of manager/glossary.md" shm/planted.md "The program is hot swapped."
+plant_in_prose "prose: tag of a type behind a sentence" "api/planted.idl:2: begins with 'who'" api/planted.idl "// It is written for each host
+// reader: who asks"
 plant_in_prose "prose: synonym" "shm/planted.md:1: 'DDS server' is not a word of manager/glossary.md" shm/planted.md "The DDS server answers."
 plant_in_prose "prose: comment in C++" "shm/base/planted.cpp:2: begins with 'What': What is read" shm/base/planted.cpp "int planted = 0;
 // What is read is checked."
@@ -226,13 +234,20 @@ plant_in_prose "prose: comment in Python" "tests/planted.py:1: begins with 'what
 plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Whoever': Whoever asks" tests/planted.sh "true
 # W""hoever asks is answered."
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
+plant_in_prose "prose: imperative in an error" "shm/base/planted.cpp:1: an error begins with an imperative: \"open \"" shm/base/planted.cpp \
+  'return check_errno(::open(path.c_str(), O_RDONLY), "open " + path);'
+plant_in_prose "prose: imperative in the format of an error" "shm/base/planted.cpp:2: an error begins with an imperative: \"make topic {}\"" shm/base/planted.cpp \
+  'return failure(code(error),
+      fmt::format("make topic {}", name));'
 plant_in_prose "prose: message of a script" "tests/planted.sh:1: begins with 'who': who asks" tests/planted.sh 'fa''il "who asks is refused"'
 plant_in_prose "prose: string of CMake" "api/CMakeLists.txt:2: 'DDS server' is not a word of manager/glossary.md" api/CMakeLists.txt 'project(planted)
 plchost_manual(planted "the DDS server of a host")'
 plant_in_prose "prose: text of a picture" "api/planted.svg:2: 'DDS server' is not a word of manager/glossary.md" api/planted.svg '<svg>
 <text x="1">the DDS <tspan>server</tspan></text></svg>'
 new_tree
-echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
+echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md"
+echo "Nobody waits. A client$(printf ' word%.0s' {1..15}): a$(printf ' word%.0s' {1..14}); a$(printf ' word%.0s' {1..12})." >>"$plot/tree/shm/planted.md"
+echo "// Takes$(printf ' word%.0s' {1..28}). timed_out: after$(printf ' word%.0s' {1..28})." >"$plot/tree/shm/planted.hpp" && commit_tree
 "$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }
 
 # plant_in_documents NAME DIAGNOSTIC FILE EXPRESSION: the whole tree, one file of it with that change (of sed)

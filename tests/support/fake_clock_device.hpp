@@ -36,7 +36,7 @@ class FakeClockDevice final : public DeviceFiles {
   int refuses_frequency = 0;  ///< errno
 
   Result<std::unique_ptr<DeviceFile>> open(const std::string& path) override {
-    if (absent) return failure(ErrorCode::unavailable, "open " + path, ENOENT);
+    if (absent) return failure(ErrorCode::unavailable, "cannot open " + path, ENOENT);
     ++opened;
     return std::make_unique<File>(*this);
   }

@@ -34,11 +34,11 @@ Result<SessionTable> SessionTable::create(dds_entity_t participant, std::string 
   PLCHOST_TRY_ASSIGN(
       table.participants_,
       dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
-                        "watch participants"));
+                        "cannot watch participants"));
   PLCHOST_TRY_ASSIGN(
       table.subscriptions_,
       dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr),
-                        "watch readers"));
+                        "cannot watch readers"));
   return table;
 }
 

@@ -65,7 +65,7 @@ Result<void> DownloadTable::begin(const dds::Guid& client, const plc_SampleIdent
   constexpr mode_t kOwnerOnly = 0600;
   const char* const path = download.path.c_str();
   download.file.reset(::open(path, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kOwnerOnly));
-  if (!download.file) return failure(ErrorCode::system, "make " + download.path, errno);
+  if (!download.file) return failure(ErrorCode::system, "cannot create " + download.path, errno);
   download.request.options[std::string(kSourceOption)] = fmt::format("{}", last_file_);
   downloads_.push_back(std::move(download));
   return {};
@@ -101,7 +101,7 @@ void DownloadTable::write(Download& download, const plc_DownloadChunk& chunk) {
         ::pwrite(download.file.get(), bytes.data(), bytes.size(), static_cast<off_t>(download.received));
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) {
-      download.failed = Error{ErrorCode::system, errno, "write " + download.path};
+      download.failed = Error{ErrorCode::system, errno, "cannot write " + download.path};
       return;
     }
     download.received += static_cast<std::uint64_t>(written);

@@ -23,8 +23,8 @@ bool is_wanted(const ObjectQuery& query, const ObjectInfo& object) {
          (query.match.empty() || matches_pattern(query.match, object.name));
 }
 
-// The word in shared memory is a stranger's: a thread of nobody who holds a reference does not hold the
-// mutex.
+// Any program may have written the word in shared memory: a thread of a process without a reference does not
+// hold the mutex.
 bool may_hold(const ObjectInfo& mutex, std::uint32_t pid) {
   return mutex.reference_count > mutex.references.size() ||
          std::ranges::find(mutex.references, pid, &ReferenceInfo::pid) != mutex.references.end();

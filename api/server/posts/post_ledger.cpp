@@ -56,7 +56,7 @@ std::string PostLedger::file_name(std::string_view pool) {
 Result<PostLedger> PostLedger::open(const ObjectPool& pool) {
   const std::string name = file_name(pool.name());
   auto memory = open_or_make_page<LedgerLayout>(name, kLedgerKind, Replaces::anything);
-  if (!memory) return failure_in("open the ledger of posts", memory.error());
+  if (!memory) return failure_in("cannot open the ledger of posts", memory.error());
   const LockResult locked = layout_of(*memory).mutex.lock(MonotonicClock::now() + kLockPatience);
   if (locked != LockResult::locked && locked != LockResult::owner_died) {
     return failure(ErrorCode::busy, fmt::format("the ledger of posts '{}' is in use by thread {}; end the "

@@ -48,19 +48,19 @@ std::vector<ObjectInfo> published_events(std::vector<ObjectInfo> objects) {
 
 Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
   auto publisher_of_status = dds::make_publisher(participant, dds::status_partition(source.host));
-  if (!publisher_of_status) return failure_in("publish status", publisher_of_status.error());
+  if (!publisher_of_status) return failure_in("cannot publish the status", publisher_of_status.error());
   const dds_entity_t parent = publisher_of_status->get();
   const StatusSource writes{.host = source.host, .epoch = source.epoch};
   auto tables = StatusTables::create(participant, parent, writes);
-  if (!tables) return failure_in("publish status", tables.error());
+  if (!tables) return failure_in("cannot publish the status", tables.error());
   auto hosts = open_table<plc_HostStatus>(participant, parent, writes);
-  if (!hosts) return failure_in("publish status", hosts.error());
+  if (!hosts) return failure_in("cannot publish the status", hosts.error());
   auto findings = open_table<plc_HostFinding>(participant, parent, writes);
-  if (!findings) return failure_in("publish status", findings.error());
+  if (!findings) return failure_in("cannot publish the status", findings.error());
   auto statistics = dds::open_writer(participant, parent, dds::kTaskStatistics);
   auto presence = dds::open_writer(participant, parent, dds::kPresence);
   for (auto* made : {&statistics, &presence}) {
-    if (!*made) return failure_in("publish status", made->error());
+    if (!*made) return failure_in("cannot publish the status", made->error());
   }
   PLCHOST_TRY_ASSIGN(
       auto transitions,

@@ -1,7 +1,9 @@
 #include "instances/runtime/application/application_host.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstdio>
 #include <exception>
 #include <iterator>
 #include <utility>
@@ -38,10 +40,12 @@ ApplicationHost* ApplicationHost::current() noexcept {
   return the_host;
 }
 
-ApplicationHost* ApplicationHost::current_for_control() noexcept {
+ApplicationHost* ApplicationHost::current_for_control(const std::source_location& caller) noexcept {
   if (the_host == nullptr || std::this_thread::get_id() == the_host->control_thread_) return the_host;
-  the_host->messages_.push(PLC_LOG_ERROR,
-                           "a function of plc_app.h for the control thread was called elsewhere");
+  std::array<char, MessageQueue::kMaxText> text{};
+  (void)std::snprintf(text.data(), text.size(), "%s belongs to the control thread: call it from plc_app_init",
+                      caller.function_name());
+  the_host->messages_.push(PLC_LOG_ERROR, text.data());
   return nullptr;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <source_location>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -31,8 +32,10 @@ class ApplicationHost {
   /// The one of this process; null if there is none.
   [[nodiscard]] static ApplicationHost* current() noexcept;
 
-  /// The same, if the caller is on the control thread, where all that is not real-time belongs; else null.
-  [[nodiscard]] static ApplicationHost* current_for_control() noexcept;
+  /// The same, if the caller is on the control thread, where all that is not real-time belongs. Else null,
+  /// and the log names `caller`.
+  [[nodiscard]] static ApplicationHost* current_for_control(
+      const std::source_location& caller = std::source_location::current()) noexcept;
 
   /// The answer of plc_instance_name(). Any context.
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }

@@ -178,7 +178,7 @@ Result<std::vector<std::byte>> read_program(const std::string& path) {
     return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::refused, "cannot be opened", error);
   }
   struct stat status{};
-  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat", errno);
+  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "cannot be examined", errno);
   if (!S_ISREG(status.st_mode)) return invalid_program("is not a file");
   if (static_cast<std::uint64_t>(status.st_size) > kMaxProgramFile) {
     return invalid_program(fmt::format("is larger than {} bytes", kMaxProgramFile));

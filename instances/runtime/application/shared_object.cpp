@@ -38,15 +38,15 @@ Result<void*> open_program(const std::string& file, const std::string& path) {
 // A file without a name that nobody can change any more.
 Result<UniqueFd> memory_file(const std::string& name, std::span<const std::byte> bytes) {
   UniqueFd file(::memfd_create(name.c_str(), MFD_CLOEXEC | MFD_ALLOW_SEALING));
-  if (!file) return failure(ErrorCode::system, "memfd_create", errno);
+  if (!file) return failure(ErrorCode::system, "cannot create a file in memory", errno);
   while (!bytes.empty()) {
     const ssize_t written = ::write(file.get(), bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return failure(ErrorCode::system, "copy into memory", errno);
+    if (written <= 0) return failure(ErrorCode::system, "cannot copy into memory", errno);
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
   if (::fcntl(file.get(), F_ADD_SEALS, F_SEAL_WRITE | F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0) {
-    return failure(ErrorCode::system, "F_ADD_SEALS", errno);
+    return failure(ErrorCode::system, "cannot seal a file in memory", errno);
   }
   return file;
 }

@@ -90,7 +90,7 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
   const auto* const own = std::ranges::find(kOwn, request.verb, &Row::first);
   if (own != kOwn.end()) return own->second(*this, request);
   return failure(ErrorCode::unsupported,
-                 fmt::format("'{}' is the manager's to do: ask it", to_string(request.verb)));
+                 fmt::format("the instance cannot do '{}'; send it to the manager", to_string(request.verb)));
 }
 
 Result<std::string> Instance::set_scheduler(const std::string& name) {

@@ -19,7 +19,8 @@ namespace {
 
 Result<void> watch(const UniqueFd& epoll, int fd, std::uint32_t events = EPOLLIN) {
   epoll_event event{.events = events, .data = {.fd = fd}};
-  PLCHOST_TRY(check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch control socket"));
+  PLCHOST_TRY(
+      check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "cannot watch the control socket"));
   return {};
 }
 
@@ -57,7 +58,7 @@ Result<InstanceSocket> InstanceSocket::listen(const std::string& path, Handler h
   PLCHOST_TRY_ASSIGN(auto listener, PacketListener::listen(path));
   reserve_descriptors();
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
-  if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
+  if (!epoll) return failure(ErrorCode::system, "cannot create an epoll descriptor", errno);
   // Told once for each new connection: one that cannot be taken must not keep the control thread awake.
   PLCHOST_TRY(watch(epoll, listener.fd(), EPOLLIN | EPOLLET));
   return InstanceSocket(std::move(listener), std::move(epoll), std::move(handler));

@@ -60,10 +60,10 @@ Result<UniqueFd> open_device(const AreaSettings& settings) {
 Result<UniqueFd> lock_file_of(const std::string& file) {
   const std::string path = MemoryFile::path(file);
   UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
-  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
   const int error = errno;
-  if (error != EWOULDBLOCK) return failure(ErrorCode::system, "lock " + path, error);
+  if (error != EWOULDBLOCK) return failure(ErrorCode::system, "cannot lock " + path, error);
   return failure(ErrorCode::busy, fmt::format("{} has a writer already: another process", path));
 }
 
@@ -128,7 +128,8 @@ Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
       ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (address == MAP_FAILED) {
     const int error = errno;
-    return failure(ErrorCode::full, fmt::format("{} bytes of memory for areas", bytes), error);
+    return failure(ErrorCode::full, fmt::format("cannot allocate {} bytes of memory for areas", bytes),
+                   error);
   }
   memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), bytes));
   memory.bytes_ = memory.mapping_.bytes();

@@ -27,7 +27,7 @@ Result<std::string> read_whole(const std::string& path) {
   std::string text(size, '\0');
   std::ifstream stream(path, std::ios::binary);
   stream.read(text.data(), static_cast<std::streamsize>(size));
-  if (!stream) return failure(ErrorCode::system, "read " + path, errno);
+  if (!stream) return failure(ErrorCode::system, "cannot read " + path, errno);
   return text;
 }
 
@@ -53,8 +53,8 @@ Result<void> RetainFiles::take() {
   constexpr mode_t kMode = 0755;
   const int error = ::mkdir(directory_.c_str(), kMode) == 0 ? 0 : errno;
   if (error != 0 && error != EEXIST && error != EROFS) {
-    return failure(ErrorCode::system, fmt::format("make the folder for retain variables {}", directory_),
-                   error);
+    return failure(ErrorCode::system,
+                   fmt::format("cannot create the folder for retain variables {}", directory_), error);
   }
   if (auto ours = check_own_folder(directory_); !ours) {
     return failure_in("folder for retain variables", ours.error());

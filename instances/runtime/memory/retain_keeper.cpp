@@ -302,8 +302,8 @@ void RetainKeeper::save() {
   if (notice_loss()) return count_unsaved();
   tell(Fault::cycles, taken == Taken::all ? ""
                       : taken == Taken::none
-                          ? "tasks were within a cycle each time"
-                          : "tasks of some areas were within a cycle each time; those of the others are");
+                          ? "the tasks were always in a cycle; raise [Retain] PostponeMs"
+                          : "the tasks of some areas were always in a cycle; raise [Retain] PostponeMs");
   if (taken != Taken::all) count_unsaved();
   if (taken == Taken::none || (image_.data == written_ && saves() > 0)) return;
   if (write_image() && taken == Taken::all) saves_.store(saves() + 1, std::memory_order_relaxed);
@@ -356,7 +356,7 @@ void RetainKeeper::tell(Fault fault, std::string why) {
   if (why == known) return;
   known = std::move(why);
   if (!known.empty()) {
-    spdlog::warn("retain variables are not written: {}; the file has those before", known);
+    spdlog::warn("retain variables are not written: {}. The file has their values from before", known);
   } else if (std::ranges::all_of(problems_, &std::string::empty)) {
     spdlog::info("retain variables are written again");
   }

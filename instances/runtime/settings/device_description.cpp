@@ -158,7 +158,7 @@ Result<DeviceDescription> read_device_description(const std::string& file) {
   std::string text;
   text.resize(kMaxDeviceDescription + 1);
   stream.read(text.data(), std::ssize(text));
-  if (stream.bad()) return failure(ErrorCode::system, "read device description " + file, errno);
+  if (stream.bad()) return failure(ErrorCode::system, "cannot read device description " + file, errno);
   text.resize(static_cast<std::size_t>(stream.gcount()));
   return parse_device_description(text, file);
 }

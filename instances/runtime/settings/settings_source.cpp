@@ -30,9 +30,10 @@ Result<std::string> read_text(const std::string& file) {
   }
   std::ifstream stream(file, std::ios::binary);
   std::string text(kMaxSettingsFile + 1, '\0');
-  if (!stream) return failure(ErrorCode::refused, fmt::format("open settings file {}", file), errno);
+  if (!stream) return failure(ErrorCode::refused, fmt::format("cannot open settings file {}", file), errno);
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return failure(ErrorCode::system, fmt::format("read settings file {}", file), errno);
+  if (stream.bad())
+    return failure(ErrorCode::system, fmt::format("cannot read settings file {}", file), errno);
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxSettingsFile) {
     return failure(ErrorCode::invalid_argument,
@@ -81,7 +82,7 @@ Result<KeptSettings> read_kept_settings(const std::string& path) {
     return failure(ErrorCode::corrupt, fmt::format("{} does not hold kept settings", path));
   };
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) return failure(ErrorCode::not_found, fmt::format("open kept settings {}", path), errno);
+  if (!stream) return failure(ErrorCode::not_found, fmt::format("cannot open kept settings {}", path), errno);
   const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
   const Json json = Json::from_cbor(bytes, true, false);
   if (!json.is_object() || !json.contains("file") || !json["file"].is_string() || !json.contains("texts") ||

@@ -16,9 +16,9 @@ namespace {
 
 Result<UniqueFd> open_at_zero(const std::string& device) {
   UniqueFd fd(::open(device.c_str(), O_WRONLY | O_CLOEXEC));
-  if (!fd) return failure(ErrorCode::refused, "open " + device, errno);
+  if (!fd) return failure(ErrorCode::refused, "cannot open " + device, errno);
   const std::int32_t microseconds = 0;
-  PLCHOST_TRY(check_errno(::write(fd.get(), &microseconds, sizeof microseconds), "write " + device));
+  PLCHOST_TRY(check_errno(::write(fd.get(), &microseconds, sizeof microseconds), "cannot write " + device));
   return fd;
 }
 

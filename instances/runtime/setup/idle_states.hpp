@@ -19,8 +19,9 @@ class IdleHold {
   };
 
   IdleHold() = default;
-  /// Takes what can be had. hold_core where the kernel cannot, or without a run directory to write down what
-  /// was before: holds all cores instead. status() says what it came to.
+  /// Holds idle states off as far as the kernel allows. status() returns the result. If the kernel cannot
+  /// hold a single core, or there is no run directory for the value before, hold_core holds all cores
+  /// instead.
   [[nodiscard]] static IdleHold take(IdleStates wanted, const std::vector<int>& cores,
                                      const std::string& run_directory, const Files& files);
 

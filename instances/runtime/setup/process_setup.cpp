@@ -40,7 +40,7 @@ Result<void> lock_memory() {
                                "LimitMEMLOCK=infinity",
                                limit.rlim_cur / 1024));
   }
-  PLCHOST_TRY(check_errno(::mlockall(MCL_CURRENT | MCL_FUTURE), "mlockall"));
+  PLCHOST_TRY(check_errno(::mlockall(MCL_CURRENT | MCL_FUTURE), "cannot lock the memory (mlockall)"));
   ::mallopt(M_TRIM_THRESHOLD, -1);
   ::mallopt(M_MMAP_MAX, 0);
   return {};
@@ -97,7 +97,7 @@ Result<NameClaim> claim_name(const LaunchOptions& launch) {
   if (!launch.run_directory.empty()) {
     auto here = LockFile::take(fmt::format("{}/{}.claim", launch.run_directory, launch.name));
     if (!here && here.error().code == ErrorCode::already_exists) return taken(here.error());
-    if (!here) return failure_in("claim the instance's name in the run directory", here.error());
+    if (!here) return failure_in("cannot claim the instance's name in the run directory", here.error());
     claim.in_run_directory.emplace(*std::move(here));
   }
   const std::string path = MemoryFile::path(instance_claim_name(launch.pool, launch.name));

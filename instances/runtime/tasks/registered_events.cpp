@@ -52,7 +52,7 @@ Result<std::vector<std::string>> read_operator_events(const std::string& path) {
   std::vector<std::string> events;
   errno = 0;
   std::ifstream file(path);
-  if (!file && errno != ENOENT) return failure(ErrorCode::system, "open " + path, errno);
+  if (!file && errno != ENOENT) return failure(ErrorCode::system, "cannot open " + path, errno);
   for (std::string line; events.size() < EventTable::kMaxEvents && std::getline(file, line);) {
     if (check_name("event name", line, kMaxEventName)) events.push_back(std::move(line));
   }
@@ -63,7 +63,7 @@ Result<void> write_operator_events(const std::string& path, const std::vector<st
   std::error_code error;
   if (events.empty()) {
     std::filesystem::remove(path, error);
-    if (error) return failure(ErrorCode::system, "remove " + path, error.value());
+    if (error) return failure(ErrorCode::system, "cannot remove " + path, error.value());
     return {};
   }
   return replace_file(path, fmt::format("{}\n", fmt::join(events, "\n")));

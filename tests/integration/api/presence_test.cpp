@@ -119,7 +119,7 @@ TEST_F(Presence, OfAServerWhoseLoopHangsEndsAlthoughDdsGoesOn) {
     const std::uint64_t before = event_.counted().count();
     ASSERT_TRUE(sut_->post_one("hosta", "line1", "ready"));
     while (event_.counted().count() == before) std::this_thread::sleep_for(milliseconds(1));
-    // The last sign of life of before may have come late.
+    // The last presence from before may have come late.
     until([this] { return sut_->is_silent("hosta"); });
   }
   until([this] { return !sut_->is_silent("hosta"); });

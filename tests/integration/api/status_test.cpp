@@ -237,7 +237,8 @@ TEST(RemoteStatus, OfAPageThatAStrangerWroteToHarmsNobody) {
   EXPECT_EQ(report->numbers.cycles, 0x8080808080808080U);
 }
 
-// DDS lets anyone dispose what another has written. A reader that has not taken that is not told by whom.
+// DDS lets any writer dispose of another one's sample. A reader that has not taken the sample does not learn
+// the writer.
 TEST(RemoteStatus, IsNotEndedByAStranger) {
   const OwnDomain domain;
   TestHost host(domain, "hosta");

@@ -98,8 +98,8 @@ TEST_F(AuxiliaryClock, DeviceThatIsMissingOrUnfitIsAnErrorInTheLogAndInTheStatus
     InstanceProcess sut(sandbox, arguments("1000"));
     sut.wait_until_up();
     EXPECT_EQ(tick_source(), "System");
-    EXPECT_THAT(tick_fallback(), HasSubstr(std::string("open ") + kDevice));
-    EXPECT_THAT(sut.log(), HasSubstr(std::string("tick source: open ") + kDevice));
+    EXPECT_THAT(tick_fallback(), HasSubstr(std::string("cannot open ") + kDevice));
+    EXPECT_THAT(sut.log(), HasSubstr(std::string("tick source: cannot open ") + kDevice));
     EXPECT_EQ(sut.end(SIGTERM), 0);
   }
   InstanceProcess sut(sandbox, arguments("1000"), environment("rtc"));

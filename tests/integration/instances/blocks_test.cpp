@@ -20,7 +20,7 @@ class BlocksBetweenInstances : public ::testing::Test {
  protected:
   using Line = std::unique_ptr<InstanceProcess>;
 
-  /// An instance that talks; `peer`: to whom, empty: it only answers.
+  /// An instance that sends blocks to `peer`; empty: it only answers.
   Line talker(const std::string& name, const std::string& peer, const std::string& settings = {},
               bool calls = false) {
     std::vector<std::string> environment;

@@ -54,7 +54,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"RunDirectoryThatIsNotThere",
              {"--run-directory", "/nonexistent"},
              3,
-             "claim the instance's name in the run directory: open /nonexistent/"},
+             "cannot claim the instance's name in the run directory: cannot open /nonexistent/"},
         Case{"MissingApplication",
              {"--application", "/nonexistent.so"},
              3,

@@ -1,4 +1,4 @@
-// Somebody on the wire who has no key: he sends again what he saw, and what he made of it.
+// An attacker on the wire without a key: it sends packets again that it saw, unchanged or altered.
 #include "tests/integration/security/packets.hpp"
 
 #include <algorithm>

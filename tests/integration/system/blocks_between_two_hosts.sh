@@ -53,7 +53,7 @@ is "$(hosts_of_gateway south)" 1 || fail "south says that it reaches '$(hosts_of
 at north show routes talker --json |
   jq -e '.[] | select(.to_hosts == "2") | .to_name == "gateway" and .sent > 0 and .sent_bytes > 0' >/dev/null ||
   fail "no way to host 2: $(at north show routes talker)"
-echo "- nobody from outside is served who was not let in: on the loopback interface there is no host"
+echo "- a client from outside is served only if it was let in: on the loopback interface there is no host"
 if within north "$BIN/plcctl" --timeout 1 list hosts 2>&1 | grep -q north; then
   fail "north answers on an interface that it was not told to use"
 fi

@@ -37,7 +37,7 @@ pid=$(as panel list instances --json | jq -r '.[0].pid')
 code=0
 plcctl --timeout 2 list hosts 2>"$cell/unknown.txt" || code=$?
 is "$code" 3 || fail "exit code $code without an identity"
-grep -q "wants an --identity" "$cell/unknown.txt" || fail "it is not said that an identity is missing"
+grep -q "needs an --identity" "$cell/unknown.txt" || fail "it is not said that an identity is missing"
 
 echo "- a revoked identity, a renewed host and a fresh client: the PLC runs on"
 report() { as panel list tasks --json | jq -r '.[] | select(.task == "Report") | .cycles'; }

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Hosts and clients of three versions of the contract in one domain: the first one, today's, and one that is still to come,
 # with a topic, an operation, fields and a code more. The promises:
-#   a client of any version sees, commands and posts to hosts of all versions with what both know;
-#   an operation that a host does not know is answered with code 10, at once;
-#   a topic that a host does not have is known as such by its counts, without waiting; one that a client does not know is ignored;
-#   a field that a host does not know, of a request or a post, is skipped; one that a client does not know is skipped, or
-#   shown by its name; a code that it does not know is shown as its number.
+# * A client of any version sees, commands and posts to hosts of all versions with the topics and fields that both know.
+# * A host answers an operation that it does not know with code 10, without delay.
+# * The counts tell a client that a host does not have a topic; it does not wait. A client ignores a topic that it does not know.
+# * A host skips a field of a request or a post that it does not know. A client skips such a field, or shows it by its name.
+# * A client shows a code that it does not know as its number.
 . "$(dirname "$0")/common.sh"
 
 write_host cell "$first_core"

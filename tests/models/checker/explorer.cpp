@@ -152,7 +152,7 @@ void Explorer::run_once() {
     collect();
     if (actions_.empty() || actions_.front().kind == Action::Kind::kill ||
         actions_.front().kind == Action::Kind::wake) {
-      return fail("asleep for ever: nobody wakes who sleeps");
+      return fail("asleep for ever: nobody wakes the sleeper");
     }
     Action action{};
     if (!decide(action)) return;

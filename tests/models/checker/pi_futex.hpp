@@ -34,7 +34,7 @@ class PiFutex {
 
   std::array<Waiter, 5> queue_{};
   unsigned waiting_ = 0;
-  int owner_ = kGone;  // for whom they wait
+  int owner_ = kGone;  // the thread for which they wait
 };
 
 }  // namespace plchost::models

@@ -1,3 +1,3 @@
 # schedulers/faults/cycle_gate.hpp: a thread that waits at the gate is not woken
-# caught as: asleep for ever: nobody wakes who sleeps
+# caught as: asleep for ever: nobody wakes the sleeper
 s/clock\.wake\(closed_\);//

@@ -1,3 +1,3 @@
 # schedulers/tasks/activation_gate.hpp: a thread that sleeps at the gate is not woken
-# caught as: asleep for ever: nobody wakes who sleeps
+# caught as: asleep for ever: nobody wakes the sleeper
 s/clock\.wake\(word_\);//

@@ -23,12 +23,12 @@ TEST(InstanceRuntimeStatus, CarriesWhatTheInstanceSays) {
   put_runtime(runtime, status);
   EXPECT_EQ(to_row(status), to_row(plc_InstanceStatus{})) << "a feature that is not in use";
   runtime.tick_source.assign("System");
-  runtime.tick_fallback.assign("open /dev/rtc7: No such file");
+  runtime.tick_fallback.assign("cannot open /dev/rtc7: No such file");
   runtime.idle_states.assign("held for core 1");
   put_runtime(runtime, status);
   const Row row = to_row(status);
   EXPECT_EQ(row["tick_source"], "System");
-  EXPECT_EQ(row["tick_fallback"], "open /dev/rtc7: No such file");
+  EXPECT_EQ(row["tick_fallback"], "cannot open /dev/rtc7: No such file");
   EXPECT_EQ(row["idle_states"], "held for core 1");
 }
 

@@ -61,14 +61,14 @@ TEST_F(IdleStatesTest, SayWhyTheyAreNotHeld) {
   std::filesystem::remove(files_.device());
   const auto sut = take(IdleStates::hold);
   EXPECT_FALSE(sut.as_wanted());
-  EXPECT_THAT(sut.status(), StartsWith("not held: open " + files_.device()));
+  EXPECT_THAT(sut.status(), StartsWith("not held: cannot open " + files_.device()));
 }
 
 TEST_F(IdleStatesTest, AreHeldForAllCoresWhereTheKernelCannotDoEach) {
   files_.add_core(1, "0\n");  // and none for core 2
   const auto sut = take(IdleStates::hold_core, {1, 2});
   EXPECT_FALSE(sut.as_wanted());
-  EXPECT_THAT(sut.status(), StartsWith("held for all cores; not for each core: open "));
+  EXPECT_THAT(sut.status(), StartsWith("held for all cores; not for each core: cannot open "));
   EXPECT_TRUE(device_holds_zero());
   EXPECT_EQ(files_.latency(1), "0");
 }
