@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# api/control.idl: each type, member and constant is described; the reference in api/reference.md is that of today; nothing of
-# the first version has changed, and until it is released its copy in the tests is today's; the version that the tests make from
-# it may follow it. Usage: contract.sh [ROOT]; prints each fault.
+# api/control.idl: each type, member and constant is described, and the reference in api/reference.md is up to date. Nothing of
+# the first version has changed; until it is released, its copy in the tests is api/control.idl. The version that the tests make
+# from it may follow it. Usage: contract.sh [ROOT]; prints each fault.
 set -euo pipefail
 here=$(cd "$(dirname "$0")/../.." && pwd)
 root=$(cd "${1:-$here}" && pwd)

@@ -30,7 +30,7 @@ echo 'add_library(GTest::gtest INTERFACE IMPORTED)' >"$cell/gtest/GTestConfig.cm
 configured -DGTest_DIR="$cell/gtest" || fail "not configured"
 says "Without the tests: GTest::gmock is not installed"
 
-echo "- GoogleTest without Cyclone's plugin for permissions, which a test loads"
+echo "- GoogleTest without Cyclone's plugin for permissions, which tests load"
 configured "$(hidden CycloneAccessControl)" || fail "not configured"
 says "Without the tests: CycloneAccessControl is not installed"
 
