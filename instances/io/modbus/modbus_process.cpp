@@ -17,8 +17,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kShow{50};     // how fine the ages are
-constexpr milliseconds kRepair{500};  // images whose file was removed
+constexpr milliseconds kShow{50};          // how fine the ages are
+constexpr milliseconds kRepairPause{500};  // images whose file was removed
 // Together below a second. At first a device that answers puts its outputs into their safe state; a thread
 // that still waits then is interrupted.
 constexpr milliseconds kSafeStateTime{600};
@@ -60,7 +60,7 @@ Result<void> ModbusProcess::start_threads() {
   if (server_) {
     PLCHOST_TRY_ASSIGN(auto thread, Thread::start("server", {}, [this] { server_->run(); }));
     threads_.push_back(std::move(thread));
-    spdlog::info("the server listens at {}, port {}", config_.server->listen, server_->port());
+    spdlog::info("the server listens at {}", config_.server->listen);
   }
   return {};
 }
@@ -108,7 +108,7 @@ void ModbusProcess::show(TimePoint now, bool ended) {
 }
 
 void ModbusProcess::repair(TimePoint now) {
-  if (now < repaired_at_ + kRepair) return;
+  if (now < repaired_at_ + kRepairPause) return;
   repaired_at_ = now;
   for (const auto& [name, image] : images_.inputs()) {
     const auto repaired = image->repair();

@@ -6,7 +6,7 @@ namespace plchost::modbus {
 
 namespace {
 
-constexpr std::chrono::milliseconds kRepair{500};
+constexpr std::chrono::milliseconds kLookPause{500};
 
 }  // namespace
 
@@ -27,7 +27,7 @@ void OutputImage::refresh() {
 
 void OutputImage::repair() {
   const TimePoint now = MonotonicClock::now();
-  if (now < looked_at_ + kRepair) return;
+  if (now < looked_at_ + kLookPause) return;
   looked_at_ = now;
   if (!image_.gone()) return;
   auto opened = ProcessImage::open(pool_, name_, static_cast<std::uint32_t>(bytes_.size()), PLC_IMAGE_READ);

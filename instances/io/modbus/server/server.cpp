@@ -45,13 +45,6 @@ Result<std::unique_ptr<Server>> Server::listen(const ServerConfig& config, const
   return std::unique_ptr<Server>(new Server(config, images, stop, std::move(fd), context));
 }
 
-std::uint16_t Server::port() const noexcept {
-  sockaddr_in6 address{};  // the port lies at the same place in both families
-  socklen_t size = sizeof address;
-  ::getsockname(listener_.get(), reinterpret_cast<sockaddr*>(&address), &size);
-  return ntohs(address.sin6_port);
-}
-
 std::vector<pollfd> Server::watched() const {
   const bool accepts = MonotonicClock::now() >= accept_again_;
   std::vector<pollfd> fds;

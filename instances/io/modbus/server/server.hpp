@@ -31,8 +31,6 @@ class Server {
                                                               const StopEvent& stop);
   /// Its thread, until the stop.
   void run();
-  /// The port that it listens at.
-  [[nodiscard]] std::uint16_t port() const noexcept;
 
  private:
   struct Client {
