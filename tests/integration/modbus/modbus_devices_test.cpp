@@ -140,7 +140,7 @@ TEST(ModbusDevices, ADeviceThatVanishesIsGoneAndComesBack) {
   peer = std::make_unique<ModbusPeer>(port);
   measure(*peer, 6);
   EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good) && plant.input_word(0) == 6; }));
-  // What the new device has forgotten is written again, although it has not changed.
+  // The new device has forgotten the outputs: they are written again, although they have not changed.
   EXPECT_TRUE(eventually([&] {
     plant.put_out(0, 77);
     return peer->holding(7) == 77;

@@ -1,6 +1,10 @@
 // modbus_terminal: a Modbus device on TCP. It prints its port, and then obeys lines of standard input:
-// "normal", "stalls", "garbage", "refuses" and "echoes" set how it answers, "holding N" prints a register,
-// "away" ends it for its clients, and "back" brings it back. It ends with its standard input.
+//
+//     normal, stalls, garbage, refuses, echoes   set how it answers
+//     holding N                                  prints a register
+//     away, back                                 end it for its clients, and bring it back
+//
+// It ends with its standard input.
 
 #include <iostream>
 #include <memory>

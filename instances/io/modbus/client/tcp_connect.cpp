@@ -35,13 +35,13 @@ Result<UniqueFd> tcp_connect(const Endpoint& endpoint, TimePoint deadline, const
   PLCHOST_TRY(check_errno(::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &one, sizeof one), "TCP_NODELAY"));
   const int connected =
       ::connect(fd.get(), reinterpret_cast<const sockaddr*>(&endpoint.address), endpoint.size);
-  if (connected != 0 && errno != EINPROGRESS) return failure(ErrorCode::unavailable, "connect", errno);
+  if (connected != 0 && errno != EINPROGRESS) return failure(ErrorCode::unavailable, "cannot connect", errno);
   if (!wait_for(fd.get(), POLLOUT, deadline, stop))
     return failure(ErrorCode::timed_out, "connect: no answer");
   int error = 0;
   socklen_t size = sizeof error;
   PLCHOST_TRY(check_errno(::getsockopt(fd.get(), SOL_SOCKET, SO_ERROR, &error, &size), "SO_ERROR"));
-  if (error != 0) return failure(ErrorCode::unavailable, "connect", error);
+  if (error != 0) return failure(ErrorCode::unavailable, "cannot connect", error);
   if (is_with_itself(fd.get())) return failure(ErrorCode::unavailable, "connect: nothing listens there");
   return fd;
 }

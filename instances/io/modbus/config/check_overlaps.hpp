@@ -7,9 +7,9 @@
 
 namespace plchost::modbus {
 
-/// Faults that only show when all is known: names twice, two devices that are one, and two maps that write
-/// the same bits of an image, the same registers of a device, or show the same registers of the server. Each
-/// problem names both lines.
+/// Finds faults that only show when all is known. Two things have one name, or two devices are one. Two maps
+/// write the same bits of an image or the same registers of a device, or show the same registers of the
+/// server. Each problem names both lines.
 void check_overlaps(const ModbusConfig& config, std::vector<ConfigProblem>& problems);
 
 }  // namespace plchost::modbus

@@ -30,7 +30,7 @@ enum class ImageDirection : std::uint8_t {
   output,  ///< written by the PLC
 };
 
-/// What values become that nobody refreshes any more.
+/// The values of inputs that are not refreshed any more.
 enum class LossPolicy : std::uint8_t { keep, zero };
 
 enum class Parity : std::uint8_t { none, even, odd };
