@@ -11,7 +11,6 @@
 namespace plchost::matiec {
 namespace {
 
-using iec::Glue;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;

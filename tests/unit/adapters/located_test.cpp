@@ -2,13 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include "instances/adapters/iec/place.hpp"
-
 namespace plchost::matiec {
 namespace {
 
-using iec::Place;
-using iec::place_of;
 using testing::HasSubstr;
 using testing::SizeIs;
 
