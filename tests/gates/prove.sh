@@ -262,7 +262,7 @@ plant_in_documents() {
 "$gates/documents.py" "$plot/tree" || { echo "the documents do not pass their gate"; failed=1; }
 plant_in_documents "documents: file of a link" "leads to no file" README.md 's,\(api/fleet.md\),(api/float.md),'
 plant_in_documents "documents: heading of a link" "leads to no heading" api/plcctl.md 's,#a-changed-configuration,#a-changed-file,'
-plant_in_documents "documents: page without a link" "no link leads here from README.md" README.md 's,\[models of protocols\]\(tests/models/README.md\),models,'
+plant_in_documents "documents: page without a link" "no link leads here from README.md" README.md 's,\[glossary\]\(manager/glossary.md\),glossary,'
 plant_in_documents "documents: long README" "lines; at most 250" README.md '1s,$,\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n,'
 plant_in_documents "documents: old figures" "is not up to date" README.md 's,^\| the same beside.*,| the same | 0.1 | 0.2 | 1 | 2 |,'
 plant_in_documents "documents: edited row of the benchmark" "is not up to date" tests/bench/figures.md '0,/\| idle \| [0-9.]+/s//| idle | 0.01/'
