@@ -19,7 +19,7 @@ install(CODE "
   COMPONENT plchost)
 
 # For applications: their headers, and the flags that they are built with.
-install(FILES instances/plc_app.h instances/plc_app.hpp instances/plc_online_change.h
+install(FILES instances/plc_app.h instances/plc_app.hpp instances/plc_online_change.h instances/plc_variables.h instances/plc_variables.hpp
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/plchost COMPONENT plchost-dev)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/share/plchost/adapters DESTINATION ${CMAKE_INSTALL_DATADIR}/plchost COMPONENT plchost)
 install(FILES api/control.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/plchost COMPONENT plchost-dev)
@@ -33,7 +33,7 @@ install(FILES ${CMAKE_BINARY_DIR}/plchostConfig.cmake ${CMAKE_BINARY_DIR}/plchos
 # The documents, and what they link to, in the folders in which they link to it.
 file(GLOB_RECURSE documents RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS *.md *.svg
   instances/examples/*.c instances/examples/*.cpp instances/examples/*.hpp instances/examples/*.cfg
-  instances/examples/*.py api/library/examples/*.cpp api/library/examples/*.py)
+  instances/examples/*.py instances/examples/*.st instances/examples/*.toml api/library/examples/*.cpp api/library/examples/*.py)
 foreach(document ${documents})
   if(document MATCHES "^(manager|schedulers|instances|shm|api|tests)/|^README.md$")
     cmake_path(GET document PARENT_PATH folder)

@@ -119,7 +119,15 @@ class PLCHOST_CLIENT_API Client {
   using Object = client_types::Object;
   using Node = client_types::Node;
   using Route = client_types::Route;
+  using Variable = client_types::Variable;
   using Finding = client_types::Finding;
+
+  /// Variables of an application, with their values of one moment.
+  struct Sample {
+    std::chrono::system_clock::time_point time;  ///< by the clock of the host
+    bool consistent = true;                      ///< no task was within a cycle
+    std::vector<Variable> variables;
+  };
 
   /// The clock of a host, as seen from here.
   struct Clock {
@@ -238,6 +246,14 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Node> nodes(const std::string& host = {}, const std::string& base = {});
   /// How blocks go from one of these nodes to another, or to other hosts.
   std::vector<Route> routes(const std::string& host = {}, const std::string& base = {});
+  /// All variables that an application declares, or those like one of the patterns: '*' any characters, '?'
+  /// one, case does not count; "Grid[1,2]" an element, "Grid[*]" each of them. By name. ClientError:
+  /// not_found: no such variable, or it declares none.
+  std::vector<Variable> variables(const std::string& host, const std::string& instance,
+                                  const std::vector<std::string>& patterns = {});
+  /// The same, with their values of one moment. ClientError: full: they are more than 1024, or some 200 kB.
+  Sample sample(const std::string& host, const std::string& instance,
+                const std::vector<std::string>& patterns);
   /// Asks the host for its time, several times: the best answer counts.
   Clock read_clock(const std::string& host = {});
   /// Has the host looked at anew. The result of each check, also of those that found nothing wrong.

@@ -283,11 +283,11 @@ typedef struct {
 /* ERR_OK; ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED: not placed yet. Any. */
 RTS_RESULT CDECL plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState);
 
-/* ---- Online change ------------------------------------------------------------------------------------- */
+/* ---- Online change, variables that are seen from outside ----------------------------------------------- */
 #include "plc_online_change.h"
+#include "plc_variables.h"
 
 /* ---- Distributed clock --------------------------------------------------------------------------------- */
-
 /*
  * The grids of all cyclic tasks follow a reference clock: their releases lie where its time modulo the task's
  * interval is the task's start offset. Under a scheduler that can move releases (CmpScheduleOneShot); under

@@ -31,6 +31,7 @@
 #include <vector>
 
 #include "plc_app.h"
+#include "plc_variables.hpp"
 
 namespace plc {
 
@@ -356,6 +357,30 @@ class Application {
     const RTS_RESULT result = plc_keep_variables(name.c_str(), &variables, sizeof variables, layout);
     if (result != ERR_OK) {
       throw std::runtime_error("variables '" + name + "' are refused: " + reason_of(result));
+    }
+  }
+
+  /// A variable that can be seen, and written and forced unless it is const, from outside by its name: a
+  /// number, a bool, std::chrono::nanoseconds (TIME), characters (STRING), an std::atomic of those, and
+  /// arrays. An array's dimensions are counted from options.first. Static, or as long-lived.
+  template <class T>
+  void variable(const std::string& name, T& variable, const VariableOptions& options = {}) {
+    Plc_Variable declared{};
+    declared.dwSize = sizeof declared;
+    detail::VariableLayout<T>::fill(declared);
+    std::string full = name;
+    for (unsigned i = 0; i < declared.nDimensions; ++i) {
+      declared.aDimensions[i].nFirst = options.first;
+      if (name.find('[') == std::string::npos) full += "[]";
+    }
+    declared.pszName = full.c_str();
+    declared.dwFlags = options.read_only || std::is_const_v<T> ? PLC_VARIABLE_READ_ONLY : 0;
+    declared.pAddress = const_cast<void*>(static_cast<const volatile void*>(&variable));
+    declared.pszTask = options.task.empty() ? nullptr : options.task.c_str();
+    declared.pszArea = options.area.empty() ? nullptr : options.area.c_str();
+    const RTS_RESULT result = plc_declare_variable(&declared);
+    if (result != ERR_OK) {
+      throw std::runtime_error("variable '" + name + "' is refused: " + reason_of(result));
     }
   }
 

@@ -104,6 +104,7 @@ share_core = true
 name = "line1"
 core = $line_core
 scheduler = "CmpSchedule"
+settings = "line1.cfg"
 application = "$applications/bottling_line.so"
 share_core = true
 
@@ -118,6 +119,7 @@ after = ["line1"]
 share_core = true
 EOF
 
+cp instances/examples/traffic_light/traffic_light.cfg "$work/line1.cfg"
 cat >"$work/packer1.cfg" <<'EOF'
 [CmpSchedule]
 Task.Freewheeling.Cycletime=5
@@ -189,6 +191,19 @@ show set scheduler line1 CmpScheduleOneShot
 further_cycles() { [ "$(ran line1)" -gt $((before + 100)) ]; }
 until_true 5 "further cycles of line1" further_cycles
 show list tasks line1
+
+# No compiler for Structured Text is a part of plchost.
+if [ -n "${PLCHOST_MATIEC:-}" ] || command -v iec2c >/dev/null; then
+  title "a program in Structured Text for the bottling line"
+  show build application instances/examples/traffic_light/traffic_light.st -o "$work/traffic_light.so"
+  show load application line1 "$work/traffic_light.so"
+  lights_run() { [ "$(task line1/lights cycles)" -gt 20 ]; }
+  until_true 20 "cycles of the traffic light" lights_run
+  show list tasks line1
+  show load application line1 --on-host "$applications/bottling_line.so"
+else
+  echo "(left out: a program in Structured Text, which needs a compiler: PLCHOST_MATIEC, or iec2c in PATH)"
+fi
 
 if [ "$keep" = yes ]; then
   title "left running (--keep)"

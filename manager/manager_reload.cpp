@@ -17,6 +17,7 @@
 #include "shm/log/log.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
+#include "shm/variables/symbol_page.hpp"
 
 namespace plchost {
 
@@ -127,6 +128,7 @@ void Manager::remove_kept_settings(const std::string& instance) const {
 
 void Manager::remove_pages(const std::string& instance) const {
   InstancePage::remove(config_.host.pool, instance);
+  SymbolPage::remove(config_.host.pool, instance);
   TransitionRing::remove(config_.host.pool, instance);
   LogRing::remove(config_.host.pool, instance);
 }

@@ -11,8 +11,9 @@
  *         plc_reference_clock_write(clock, reference, local, 1);
  *
  * The record is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance follows it with
- * [DistributedClock] Reference=NAME in its settings. The first one makes it, firmware or instance; it
- * outlives both. It is an object of the pool like all others once a program opens it there by name, or the
+ * [DistributedClock] Reference=NAME in its settings. The names "realtime" and "tai" are those of clocks of
+ * the host there: no instance follows a record of such a name. The first one makes it, firmware or instance;
+ * it outlives both. It is an object of the pool like all others once a program opens it there by name, or the
  * manager has looked. One writer at a time, any number of readers; nobody ever waits.
  *
  * A pair is good if both stamps are of the same instant. A pair whose stamps were torn apart (the writer lost

@@ -121,7 +121,7 @@ unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
 # Parts that a user may do without are required: with one of them its proof would go, and nobody would see it.
 # Collecting garbage takes a tenth of the time of g++, so it does that less often.
 build_plain() {
-  configure "$build" -DPLCHOST_TESTS=ON -DPLCHOST_PYTHON=ON -DPLCHOST_OTHER_VENDOR=ON -DPLCHOST_MANUALS=ON "${unity[@]}" \
+  configure "$build" -DPLCHOST_TESTS=ON -DPLCHOST_PYTHON=ON -DPLCHOST_OTHER_VENDOR=ON -DPLCHOST_MANUALS=ON -DPLCHOST_MODBUS=ON "${unity[@]}" \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O2 -g1 -DNDEBUG --param ggc-min-heapsize=1000000" && cmake --build "$build" -j "$jobs"
 }
 # By clang, which takes half of g++'s time for it; so a second compiler has seen everything.
@@ -129,7 +129,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
   local dir=$1 sanitizers=$2 target=$3
   shift 3
   configure "$dir" -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DSANITIZER="$sanitizers" -DPLCHOST_TESTS=ON \
-    -DPLCHOST_BENCH=OFF "${unity[@]}" \
+    -DPLCHOST_MODBUS=ON -DPLCHOST_BENCH=OFF "${unity[@]}" \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
@@ -161,7 +161,7 @@ count() { # adds up the summary of the step that just ran
 
 # Over the product's code; the tests are compiled with all warnings as errors like everything else.
 tidy() {
-  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_PYTHON=ON -DCMAKE_BUILD_TYPE=Debug \
+  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug \
     -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON "${unity[@]}" &&
     cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
@@ -169,7 +169,7 @@ tidy() {
 # One fuzzer starts a program that the plain build has made.
 build_fuzzers() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
-    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_GATED_CYCLONE="$PWD/$build/bin/gated_cyclone" "${unity[@]}" \
+    -DPLCHOST_MODBUS=ON -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_GATED_CYCLONE="$PWD/$build/bin/gated_cyclone" "${unity[@]}" \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1 -DNDEBUG" -DCMAKE_C_FLAGS_DEBUG="-O1 -g1 -DNDEBUG" &&
     cmake --build .build/fuzz -j "$jobs" --target fuzzers
 }

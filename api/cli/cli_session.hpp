@@ -77,6 +77,9 @@ class CliSession {
   std::unique_ptr<ControlClient> client_;
 };
 
+/// Whether asking again may help: a server or an instance was started anew, or is busy.
+[[nodiscard]] bool comes_back(const Error& error) noexcept;
+
 /// One of the functions of ControlClient that give all samples of a topic of one host.
 template <class Sample>
 using Snapshot = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
@@ -89,9 +92,11 @@ void add_post_verb(const Command& plcctl, CliSession& session);
 void add_logs_verb(const Command& plcctl, CliSession& session);
 void add_wait_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
+void add_variable_verbs(const Command& plcctl, CliSession& session);
 void add_plant_verbs(const Command& plcctl, CliSession& session);
 void add_verify_verb(const Command& plcctl, CliSession& session);
 void add_build_verb(const Command& plcctl, CliSession& session);
+void add_export_verb(const Command& plcctl, CliSession& session, const std::string& version);
 void add_completion_verb(const Command& plcctl);
 
 /// " (did you mean 'x'?)", or nothing if no name is near.

@@ -191,12 +191,14 @@ int main(int argc, char** argv) {
   plchost::add_check_verb(plcctl, session);
   plchost::add_post_verb(plcctl, session);
   plchost::add_logs_verb(plcctl, session);
+  plchost::add_variable_verbs(plcctl, session);
   plchost::add_wait_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);
   plchost::add_plant_verbs(plcctl, session);
   plchost::add_verify_verb(plcctl, session);
   plchost::add_build_verb(plcctl, session);
+  plchost::add_export_verb(plcctl, session, PLCHOST_VERSION);
   plchost::add_completion_verb(plcctl);
   const std::vector<std::string> words(argv + 1, argv + argc);
   plchost::start_log("plcctl", "warning");

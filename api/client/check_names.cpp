@@ -14,7 +14,7 @@ static_assert(sizeof(plc_EventPost::instance) == kMaxInstanceName + 1);
 static_assert(sizeof(plc_EventPost::event) == kMaxEventName + 1);
 static_assert(sizeof(plc_RequestHeader::instance_name) == kMaxHostName + 1);
 static_assert(sizeof(plc_Request::instance) == kMaxInstanceName + 1);
-static_assert(sizeof(plc_Request::argument) == kMaxPath + 1);
+static_assert(sizeof(plc_Request::argument) == kMaxArgument + 1);
 
 Result<void> check_instance_name(std::string_view instance) {
   return check_name("instance", instance, kMaxInstanceName);
@@ -49,10 +49,10 @@ Result<void> check_api_request(const ApiRequest& request, std::string_view only)
   if (!request.instance.empty()) {
     PLCHOST_TRY(check_instance_name(request.instance));
   }
-  if (request.argument.size() <= kMaxPath && !request.argument.contains('\0')) return {};
+  if (request.argument.size() <= kMaxArgument && !request.argument.contains('\0')) return {};
   return failure(ErrorCode::invalid_argument,
                  fmt::format("argument '{}' of {} bytes: allowed are up to {}, and no zero among them",
-                             shown(request.argument), request.argument.size(), kMaxPath));
+                             shown(request.argument), request.argument.size(), kMaxArgument));
 }
 
 Result<std::pair<std::string, std::string>> split_name(std::string_view what, std::string_view text) {

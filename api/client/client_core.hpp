@@ -72,6 +72,8 @@ class ClientCore {
   Async<Result<NodesTold>> list_routes(std::string host, NodeQuery query, TimePoint deadline);
   Async<Result<LogListing>> read_log(std::string host, std::string instance, LogQuery query,
                                      TimePoint deadline);
+  Async<Result<VariableListing>> list_variables(std::string host, std::string instance, VariableQuery query,
+                                                TimePoint deadline);
   Async<Result<std::vector<plc_HostFinding>>> check_host(std::string host, TimePoint deadline);
   Async<Result<bool>> has_all_transitions(std::string host, TimePoint deadline);
 
@@ -196,7 +198,7 @@ class ClientCore {
   Duration quiet_ = kQuiet;
   dds::TopicReader replies_;
   Inbox<ApiReply> replied_;
-  std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>> pages_;
+  std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>, Pages<plc_VariablePage>> pages_;
   dds::TopicReader acks_;
   dds::TopicReader runs_;
   Inbox<Result<RunReport>> run_;

@@ -29,6 +29,7 @@ void ClientCore::take_pages(Pages<Page>& pages) {
 template void ClientCore::take_pages(Pages<plc_ObjectPage>&);
 template void ClientCore::take_pages(Pages<plc_NodePage>&);
 template void ClientCore::take_pages(Pages<plc_LogPage>&);
+template void ClientCore::take_pages(Pages<plc_VariablePage>&);
 
 template <class Page>
 Async<Result<ListingOf<Page>>> ClientCore::ask_for_page(ApiRequest request, TimePoint deadline) {
@@ -88,6 +89,17 @@ Async<Result<LogListing>> ClientCore::read_log(std::string host, std::string ins
                      .argument = "",
                      .part = part_of(query)};
   return ask_for_page<plc_LogPage>(std::move(request), deadline);
+}
+
+Async<Result<VariableListing>> ClientCore::list_variables(std::string host, std::string instance,
+                                                          VariableQuery query, TimePoint deadline) {
+  PLCHOST_CO_TRY_ASSIGN(const auto part, part_of(query));
+  ApiRequest request{.host = std::move(host),
+                     .operation = plc_OPERATION_LIST_VARIABLES,
+                     .instance = std::move(instance),
+                     .argument = "",
+                     .part = part};
+  co_return co_await ask_for_page<plc_VariablePage>(std::move(request), deadline);
 }
 
 }  // namespace plchost

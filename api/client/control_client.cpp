@@ -88,6 +88,11 @@ Result<LogListing> ControlClient::read_log(const std::string& host, const std::s
   return wait(core_->read_log(host, instance, query, deadline));
 }
 
+Result<VariableListing> ControlClient::list_variables(const std::string& host, const std::string& instance,
+                                                      const VariableQuery& query, TimePoint deadline) {
+  return wait(core_->list_variables(host, instance, query, deadline));
+}
+
 Result<std::vector<plc_HostFinding>> ControlClient::check_host(const std::string& host, TimePoint deadline) {
   return wait(core_->check_host(host, deadline));
 }

@@ -110,6 +110,11 @@ class ControlClient {
   /// failure is the host's own: not_found: it has no such instance.
   [[nodiscard]] Result<LogListing> read_log(const std::string& host, const std::string& instance,
                                             const LogQuery& query, TimePoint deadline);
+  /// A part of the variables that an instance's application declares, with their values of one moment. Not
+  /// complete: go on with query.after = next_after. The code of the failure is the host's own: not_found: no
+  /// such instance or variable, or it declares none.
+  [[nodiscard]] Result<VariableListing> list_variables(const std::string& host, const std::string& instance,
+                                                       const VariableQuery& query, TimePoint deadline);
   /// One for each instance; count 0: it never had an exception.
   [[nodiscard]] Result<std::vector<plc_ExceptionStatus>> exceptions(const std::string& host,
                                                                     TimePoint deadline);

@@ -48,6 +48,10 @@ std::string_view argument_name(OperationArgument argument) {
       return "event";
     case OperationArgument::task_or_none:
       return "task";
+    case OperationArgument::variable_value:
+      return "variable=value";
+    case OperationArgument::variable_or_all:
+      return "variable";
   }
   return "";
 }

@@ -25,10 +25,11 @@ std::vector<std::string> hosts_of(ControlClient& client, const std::string& host
 
 namespace {
 
-// But for what is looked at every 2 s and nearly always another number.
+// But for what is nearly always another number.
 bool is_told(const Client::Host& before, Client::Host now) {
   now.load_percent = before.load_percent;
   now.available_mib = before.available_mib;
+  now.grid_offset = before.grid_offset;
   return before == now;
 }
 

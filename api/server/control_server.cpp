@@ -109,7 +109,7 @@ Result<void> ControlServer::Parts::raise_loop() const {
 Result<void> ControlServer::Parts::run() {
   PLCHOST_TRY(raise_loop());
   for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(), run_timer.get(),
-                       identity_timer.get(), manager->fd()}) {
+                       identity_timer.get(), manager->fd(), variables->fd()}) {
     epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
     PLCHOST_TRY(
         check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "cannot watch a descriptor"));
@@ -135,6 +135,10 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     }
     return true;
   }
+  if (fd == variables->fd()) {
+    tell_variables(variables->receive());
+    return true;
+  }
   drain(fd);
   if (fd == wake.get()) {
     on_wake();
@@ -152,6 +156,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     send_late_answers(now);
     answer_finished(now);
     finish(manager->expire(now));
+    tell_variables(variables->expire(now));
     serve_downloads(now);
   } else if (fd == run_timer.get()) {
     look_at_runs();
@@ -302,6 +307,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   const dds::Guid client = writer.participant();
   if (const Answer* const known = answers.find(client, identity)) return send(client, *known);
   if (manager->is_pending(identity) || is_late(identity) || downloads.repeat(identity)) return;
+  if (variables->is_pending(identity)) return;
   const auto timeliness = dds::timeliness(request.limit, epoch);
   if (timeliness == dds::Timeliness::other_epoch) return;  // it comes again, with another limit
   if (timeliness != dds::Timeliness::in_time) return refuse(client, request, untimely(request.limit));
@@ -315,6 +321,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
     return list_nodes(checked->verb, client, request);
   }
   if (checked->verb == ControlVerb::read_log) return read_log(client, request);
+  if (checked->verb == ControlVerb::list_variables) return list_variables(client, request);
   audit->handed_on(identity);
   if (checked->verb == ControlVerb::download_application) {
     return begin_download(client, identity, *std::move(checked));
@@ -328,56 +335,6 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   if (auto sent = manager->send(std::move(*checked), command); !sent) {
     answer(client, identity, sent.error().code, sent.error().describe());
   }
-}
-
-// The page first: a client that has the answer has it, or asks again.
-void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Request& request) {
-  const plc_SampleIdentity& identity = request.header.request_identity;
-  const auto look = [&]() -> Result<ObjectListing> {
-    PLCHOST_TRY_ASSIGN(const auto query, object_query_of(request.part));
-    return lister.page(query);
-  };
-  const auto listing = look();
-  if (!listing) return tell(client, identity, listing.error().code, listing.error().describe());
-  ObjectPageSample sample(*listing);
-  send_page(client, request, sample.page());
-}
-
-void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request) {
-  const auto look = [&]() -> Result<NodeListing> {
-    PLCHOST_TRY_ASSIGN(const auto query, node_query_of(request.part));
-    return verb == ControlVerb::list_nodes ? nodes.nodes(query) : nodes.routes(query);
-  };
-  const auto listing = look();
-  if (!listing) {
-    return tell(client, request.header.request_identity, listing.error().code, listing.error().describe());
-  }
-  NodePageSample sample(*listing);
-  send_page(client, request, sample.page());
-}
-
-void ControlServer::Parts::read_log(const dds::Guid& client, const plc_Request& request) {
-  const auto look = [&]() -> Result<LogListing> {
-    PLCHOST_TRY_ASSIGN(const auto query, log_query_of(request.part));
-    return look_at_log(pool.name(), dds::text_of(request.instance), query);
-  };
-  const auto slice = look();
-  if (!slice) {
-    return tell(client, request.header.request_identity, slice.error().code, slice.error().describe());
-  }
-  LogPageSample sample(*slice);
-  dds::copy_text(sample.page().instance, dds::text_of(request.instance));
-  send_page(client, request, sample.page());
-}
-
-template <class Page>
-void ControlServer::Parts::send_page(const dds::Guid& client, const plc_Request& request, Page& page) {
-  page.related_identity = request.header.request_identity;
-  dds::copy_text(page.host, options.host);
-  page.epoch = epoch;
-  const bool written = sessions->write_page(client, page);
-  tell(client, request.header.request_identity, written ? ErrorCode::ok : ErrorCode::busy,
-       written ? "" : "the client does not take the page that it asked for; ask again");
 }
 
 Result<void> ControlServer::Parts::on_manager() {

@@ -25,6 +25,7 @@
 #include "api/server/heap_trim.hpp"
 #include "api/server/lists/node_lister.hpp"
 #include "api/server/lists/object_lister.hpp"
+#include "api/server/lists/variable_lister.hpp"
 #include "api/server/manager_link.hpp"
 #include "api/server/name_claim.hpp"
 #include "api/server/posts/event_intake.hpp"
@@ -84,12 +85,16 @@ struct ControlServer::Parts {
   [[nodiscard]] bool is_late(const plc_SampleIdentity& identity) const;
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
+  [[nodiscard]] bool collect_findings(FinishedCommand& finished);
+
+  // Lists: control_server_lists.cpp
   void list_objects(const dds::Guid& client, const plc_Request& request);
   void list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request);
   void read_log(const dds::Guid& client, const plc_Request& request);
+  void list_variables(const dds::Guid& client, const plc_Request& request);
+  void tell_variables(std::vector<VariableLister::Finished> finished);
   template <class Page>
-  void send_page(const dds::Guid& client, const plc_Request& request, Page& page);
-  [[nodiscard]] bool collect_findings(FinishedCommand& finished);
+  void send_page(const dds::Guid& client, const plc_SampleIdentity& identity, Page& page);
 
   // Downloads: control_server_downloads.cpp
   void begin_download(const dds::Guid& client, const plc_SampleIdentity& identity, ControlRequest request);
@@ -108,6 +113,7 @@ struct ControlServer::Parts {
   ObjectPool pool;
   ObjectLister lister;
   NodeLister nodes;
+  std::optional<VariableLister> variables;
   std::uint64_t epoch;
   UniqueFd epoll;
   UniqueFd wake;

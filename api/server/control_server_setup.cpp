@@ -54,6 +54,7 @@ Result<void> ControlServer::Parts::open() {
   PLCHOST_TRY(make_guard());
   PLCHOST_TRY_ASSIGN(auto ledger, PostLedger::open(pool));
   PLCHOST_TRY_ASSIGN(manager, ManagerLink::connect(options.run_directory));
+  PLCHOST_TRY_ASSIGN(variables, VariableLister::create(options.pool, options.run_directory));
   intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
   PLCHOST_TRY(enter_domain());
   PLCHOST_TRY(claim_name());

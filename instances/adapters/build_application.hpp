@@ -12,15 +12,18 @@ namespace plchost {
 
 /// The order to `plcctl build application`.
 struct BuildOrder {
-  std::vector<std::string> sources;  ///< files, and folders whose *.st are meant
+  std::vector<std::string> sources;  ///< files (ST, or PLCopen XML), and folders whose *.st are meant
   std::string tasks = {};            ///< task file; empty: X.toml beside a single source X.st, if it is there
-  std::string output;         ///< the application: line.so. Of several resources each has its name in it
-  std::string matiec;         ///< folder of the compiler; empty: PLCHOST_MATIEC, PATH
-  std::string adapters;       ///< folder of plc_app.h and of the adapters' C files
+  std::string output;  ///< the application: line.so. Of several resources each has its name in it
+  std::string compiler =
+      {};              ///< matiec or strucpp; empty: the one of which the folder is named, or that is there
+  std::string matiec;  ///< folder of that compiler; empty: PLCHOST_MATIEC, PATH
+  std::string strucpp = {};   ///< folder of that compiler; empty: PLCHOST_STRUCPP, PATH
+  std::string adapters;       ///< folder of plc_app.h and of the adapters' files
   std::string keep;           ///< folder in which the files between are left (see WorkFolder); empty: nowhere
   std::string check_program;  ///< plc-instance; empty: the application is not checked
-  Duration translate_limit = std::chrono::seconds(120);  ///< of iec2c, and of the check
-  Duration compile_limit = std::chrono::seconds(600);    ///< of the C compiler
+  Duration translate_limit = std::chrono::seconds(120);  ///< of iec2c or STruC++, and of the check
+  Duration compile_limit = std::chrono::seconds(600);    ///< of the C and C++ compilers
   std::function<bool()> cancelled = nullptr;  ///< asked every 50 ms: the build ends, nothing is left
 };
 

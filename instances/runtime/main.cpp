@@ -52,10 +52,11 @@ Result<UniqueFd> start_heartbeat() {
 
 // Until a signal or a client asks for the end.
 Result<void> serve(Instance& instance, const UniqueFd& signals, const UniqueFd& heartbeat) {
-  std::array<pollfd, 4> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
+  std::array<pollfd, 5> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
                              {.fd = heartbeat.get(), .events = POLLIN, .revents = 0},
                              {.fd = instance.control_fd(), .events = POLLIN, .revents = 0},
-                             {.fd = instance.fault_fd(), .events = POLLIN, .revents = 0}}};
+                             {.fd = instance.fault_fd(), .events = POLLIN, .revents = 0},
+                             {.fd = instance.values_fd(), .events = POLLIN, .revents = 0}}};
   while (!instance.ended()) {
     const auto soon = instance.wants_advance_in();
     const timespec timeout = to_timespec(soon.value_or(Duration::zero()));
@@ -72,6 +73,7 @@ Result<void> serve(Instance& instance, const UniqueFd& signals, const UniqueFd& 
     if (fds[1].revents != 0 && ::read(heartbeat.get(), &expirations, sizeof expirations) > 0) instance.beat();
     if (fds[3].revents != 0) instance.serve_faults();  // first: later requests find the state right
     if (fds[2].revents != 0) instance.serve_control();
+    if (fds[4].revents != 0) instance.serve_values();
     instance.advance();
   }
   return {};

@@ -138,21 +138,6 @@ void check_relations(const ManagerConfig& config, const ConfigLines& lines, cons
   relations.check_circles();
 }
 
-Result<void> check_readable_file(const std::string& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    return failure(ErrorCode::not_found, fmt::format("there is no file {}", path));
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    return failure(ErrorCode::invalid_argument, fmt::format("{} is not a file", path));
-  }
-  if (::access(path.c_str(), R_OK) != 0) {
-    return failure(ErrorCode::refused, fmt::format("{} cannot be read", path), errno);
-  }
-  return {};
-}
-
 namespace {
 
 // Root may write there as far as access() can tell, but nobody can make a folder or a file.

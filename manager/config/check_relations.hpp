@@ -22,9 +22,6 @@ using ConfigLines = std::vector<InstanceLines>;
 void check_relations(const ManagerConfig& config, const ConfigLines& lines, const std::vector<int>& online,
                      std::vector<ConfigProblem>& problems);
 
-/// The error says what is wrong with the file.
-[[nodiscard]] Result<void> check_readable_file(const std::string& path);
-
 /// The folder is there and can be written, or its nearest parent that is there can. The error names which.
 [[nodiscard]] Result<void> check_directory_can_be_made(const std::string& path);
 

@@ -18,64 +18,21 @@ using enum TakesEffect;
 constexpr std::array kPriorityBands = {std::string_view("high"), std::string_view("normal"),
                                        std::string_view("low")};
 
-// Stands for any member of an aggregate, to count them.
-struct AnyMember {
-  template <class Member>
-  operator Member() const;  // NOLINT: implicit on purpose, and never defined
-};
-
-template <class Config, class... Members>
-consteval std::size_t count_members() {
-  if constexpr (requires { Config{Members{}..., AnyMember{}}; }) {
-    return count_members<Config, Members..., AnyMember>();
-  } else {
-    return sizeof...(Members);
-  }
-}
-
-template <auto Member>
-struct Access;
-
-template <class Config, class Value, Value Config::* Member>
-struct Access<Member> {
-  static bool differs(const Config& before, const Config& now) { return !(before.*Member == now.*Member); }
-  static void take(Config& used, const Config& now) { used.*Member = now.*Member; }
-  template <class Kind>
-  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
-                   Config& target) {
-    Kind::read(reading, reader, name, target.*Member);
-  }
-  template <class Kind>
-  static std::string initial() {
-    return Kind::shown(Config{}.*Member);
-  }
-  template <class Kind>
-  static constexpr ConfigRow<Config> row(std::string_view section, ConfigKey key) {
-    key.section = section;
-    return {.key = key,
-            .read = &Access::read<Kind>,
-            .differs = &Access::differs,
-            .take = &Access::take,
-            .allowed = &Kind::allowed,
-            .initial = &Access::initial<Kind>};
-  }
-};
-
 template <auto Member, class Kind>
 constexpr auto host(const ConfigKey& key) {
-  return Access<Member>::template row<Kind>("[host]", key);
+  return KeyAccess<Member>::template row<Kind, ConfigReading>("[host]", key);
 }
 template <auto Member, class Kind>
 constexpr auto dds(const ConfigKey& key) {
-  return Access<Member>::template row<Kind>("[dds]", key);
+  return KeyAccess<Member>::template row<Kind, ConfigReading>("[dds]", key);
 }
 template <auto Member, class Kind>
 constexpr auto blocks(const ConfigKey& key) {
-  return Access<Member>::template row<Kind>("[blocks]", key);
+  return KeyAccess<Member>::template row<Kind, ConfigReading>("[blocks]", key);
 }
 template <auto Member, class Kind>
 constexpr auto instance(const ConfigKey& key) {
-  return Access<Member>::template row<Kind>("[[instance]]", key);
+  return KeyAccess<Member>::template row<Kind, ConfigReading>("[[instance]]", key);
 }
 
 constexpr std::string_view kOfNewObjects = "by the pool and by new objects; the others keep their rights";
@@ -261,17 +218,6 @@ static_assert(kBlocksKeys.size() == count_members<BlocksConfig>(), "each key of 
 static_assert(kInstanceKeys.size() == count_members<InstanceConfig>(),
               "each key of [[instance]] has its row");
 
-template <class Rows>
-void add_section(const Rows& rows, std::string& table) {
-  bool first = true;
-  for (const auto& row : rows) {
-    const std::string section = std::exchange(first, false) ? fmt::format("**{}** ", row.key.section) : "";
-    const std::string initial = row.key.initial.empty() ? row.initial() : std::string(row.key.initial);
-    table += fmt::format("| {}`{}` | {} | {} | {} |\n", section, row.key.name, row.key.meaning, row.allowed(),
-                         initial.empty() ? "none" : initial);
-  }
-}
-
 }  // namespace
 
 std::span<const ConfigRow<HostConfig>> host_keys() noexcept {
@@ -288,7 +234,7 @@ std::span<const ConfigRow<InstanceConfig>> instance_keys() noexcept {
 }
 
 std::string config_key_table() {
-  std::string table = "| key | meaning | allowed | default |\n| --- | --- | --- | --- |\n";
+  std::string table(kKeyTableHead);
   add_section(kHostKeys, table);
   add_section(kDdsKeys, table);
   add_section(kBlocksKeys, table);

@@ -7,7 +7,7 @@
 
 #include "manager/config/load_config.hpp"
 #include "manager/config/manager_config.hpp"
-#include "shm/toml/section_reader.hpp"
+#include "shm/toml/key_table.hpp"
 
 namespace plchost {
 
@@ -38,18 +38,9 @@ struct ConfigReading {
   const ManagerConfig& config;  ///< as far as it was read
 };
 
-/// One row of the table of keys: reading with its range and errors, comparison, documentation. Config is the
-/// struct of its section.
+/// One row of the table of keys. Config is the struct of its section.
 template <class Config>
-struct ConfigRow {
-  ConfigKey key;
-  /// Checks the value and writes it; the default is checked, too. Errors go to the reader.
-  void (*read)(const ConfigReading& reading, SectionReader& reader, std::string_view name, Config& target);
-  bool (*differs)(const Config& before, const Config& now);
-  void (*take)(Config& used, const Config& now);
-  std::string (*allowed)();  ///< "1 to 1024"
-  std::string (*initial)();  ///< that of the struct; empty: none
-};
+using ConfigRow = KeyRow<ConfigKey, Config, ConfigReading>;
 
 // The tables, in the order of the file and of manager/configuration.md. Each member of the struct has its
 // row.
@@ -57,14 +48,6 @@ struct ConfigRow {
 [[nodiscard]] std::span<const ConfigRow<DdsConfig>> dds_keys() noexcept;
 [[nodiscard]] std::span<const ConfigRow<BlocksConfig>> blocks_keys() noexcept;
 [[nodiscard]] std::span<const ConfigRow<InstanceConfig>> instance_keys() noexcept;
-
-/// Reads all keys of a section, and refuses those that no row has.
-template <class Config>
-void read_keys(std::span<const ConfigRow<Config>> rows, const ConfigReading& reading, SectionReader& reader,
-               Config& target) {
-  for (const ConfigRow<Config>& row : rows) row.read(reading, reader, row.key.name, target);
-  reader.refuse_unknown_keys();
-}
 
 /// The table of manager/configuration.md, a line with its end for each row.
 [[nodiscard]] std::string config_key_table();

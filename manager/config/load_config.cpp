@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,6 +12,7 @@
 #include "shm/base/names.hpp"
 #include "shm/pages/host_page.hpp"
 #include "shm/toml/section_reader.hpp"
+#include "shm/toml/text_file.hpp"
 #include "shm/toml/toml_document.hpp"
 
 namespace plchost {
@@ -230,22 +228,9 @@ std::expected<ManagerConfig, ConfigErrors> parse_config(std::string_view text, c
 
 std::expected<ManagerConfig, ConfigErrors> load_config(const std::string& file,
                                                        const ConfigSurroundings& surroundings) {
-  if (const auto readable = check_readable_file(file); !readable) {
-    return std::unexpected(ConfigErrors{fmt::format("{}: {}", file, readable.error().describe())});
-  }
-  std::ifstream stream(file, std::ios::binary);
-  std::string text(kMaxConfigBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) {  // half a file is another configuration
-    const auto why = failure(ErrorCode::system, "cannot be read", errno);
-    return std::unexpected(ConfigErrors{fmt::format("{}: {}", file, why.error().describe())});
-  }
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > kMaxConfigBytes) {
-    return std::unexpected(
-        ConfigErrors{fmt::format("{}: is larger than the {} bytes that are allowed", file, kMaxConfigBytes)});
-  }
-  return parse_config(text, file, surroundings);
+  const auto text = read_config_text(file, kMaxConfigBytes);
+  if (!text) return std::unexpected(ConfigErrors{fmt::format("{}: {}", file, text.error().describe())});
+  return parse_config(*text, file, surroundings);
 }
 
 }  // namespace plchost

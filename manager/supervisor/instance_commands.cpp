@@ -94,12 +94,14 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
       return check_name("event", request.argument, kMaxEventName);
     case OperationArgument::task_or_none:
       return request.argument.empty() ? Result<void>() : check_name("task", request.argument, kMaxTaskName);
+    case OperationArgument::variable_value:
+    case OperationArgument::variable_or_all:  // the instance knows its variables
+    case OperationArgument::none:
+      return {};
     case OperationArgument::path:
       return check_path(request);
     case OperationArgument::file:
       return check_file_name(request.argument);
-    case OperationArgument::none:
-      return {};
   }
   return {};
 }

@@ -38,7 +38,7 @@ struct DistributedClockSettings {
                                                       .highest = std::chrono::hours(1)};
   static constexpr Bounds<Duration> kHoldOver{.lowest = Duration(0), .highest = std::chrono::hours(1)};
 
-  std::string reference;      ///< name of the reference record in the pool; empty: the application reports
+  std::string reference;      ///< as [DistributedClock] Reference names it; empty: the application reports
   int kp_ppm = 30'000;        ///< share of a pair's deviation that moves the phase
   int ki_ppm = 200;           ///< share that moves the drift
   Duration max_correction{};  ///< of one release, either way; 0: 1 % of the task's interval

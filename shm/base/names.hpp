@@ -19,6 +19,8 @@ inline constexpr std::size_t kMaxTaskName = 50;
 inline constexpr std::size_t kMaxEventName = 50;
 inline constexpr std::size_t kMaxObjectName = 95;
 inline constexpr std::size_t kMaxPath = 255;
+/// The argument of an operation: a path, a name, or the name and the value of a variable.
+inline constexpr std::size_t kMaxArgument = 511;
 inline constexpr std::size_t kMaxSchedulerName = 31;
 /// All schedulers of a host, with commas between.
 inline constexpr std::size_t kMaxSchedulerList = 511;

@@ -30,11 +30,13 @@ enum class ApiRole : std::uint8_t { operating, engineering };
 
 enum class OperationArgument : std::uint8_t {
   none,
-  path,          ///< of an application, absolute, on the host
-  file,          ///< name of an application's file, for people
-  scheduler,     ///< name of a scheduler
-  event,         ///< name of an external event of the instance
-  task_or_none,  ///< name of a task; empty: all tasks
+  path,             ///< of an application, absolute, on the host
+  file,             ///< name of an application's file, for people
+  scheduler,        ///< name of a scheduler
+  event,            ///< name of an external event of the instance
+  task_or_none,     ///< name of a task; empty: all tasks
+  variable_value,   ///< NAME=VALUE: a variable of the application, and a value as Structured Text writes it
+  variable_or_all,  ///< name of a variable; "*": all
 };
 
 /// The options of a request beside its argument.

@@ -32,7 +32,8 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
   const std::array names = {std::string(pool), host_page_name(pool), fmt::format("{}.posts", pool)};
   const std::array beginnings = {instance_page_name(pool, ""),      instance_claim_name(pool, ""),
                                  transition_ring_name(pool, ""),    log_ring_name(pool, ""),
-                                 fmt::format("{}.download.", pool), fmt::format("{}.wish.", pool)};
+                                 fmt::format("{}.download.", pool), fmt::format("{}.wish.", pool),
+                                 fmt::format("{}.variables.", pool)};
   const bool ours =
       std::ranges::find(names, file) != names.end() ||
       std::ranges::any_of(beginnings, [&](const auto& begin) { return file.starts_with(begin); });

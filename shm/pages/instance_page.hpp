@@ -77,6 +77,8 @@ struct InstanceRuntime {
   ClockRuntime clock;
   ApplicationState state = ApplicationState::none;
   FixedText<kMaxPath> problem;         ///< why it is in exception; else empty
+  std::uint32_t variables = 0;         ///< that its application has declared
+  std::uint32_t forces = 0;            ///< of them, elements that are forced
   FixedText<kMaxPath> retain_problem;  ///< why its newest retain values are in no file; empty: they are
 };
 

@@ -55,6 +55,31 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
   remove_pool_memories(name);
 }
 
+TEST(NoAllocation, InCyclesWithForcesThatAreExchanged) {
+  std::array<std::int16_t, 3> values{};
+  std::array<char, 20> text{};
+  std::vector<ForceList> lists(2);
+  const std::array one{std::byte{1}, std::byte{0}};
+  for (std::int16_t& value : values) lists[0].add(std::as_writable_bytes(std::span(&value, 1)).data(), one);
+  const std::vector<std::byte> letters(text.size(), std::byte{'x'});
+  lists[1].add(std::as_writable_bytes(std::span(text)).data(), letters);
+  std::vector<ForceSlot> slots(1);
+  std::vector<TaskConfig> tasks(1);
+  tasks[0].name = "Main";
+  tasks[0].entry = [&] { values = {2, 2, 2}; };
+  Areas areas;
+  ASSERT_TRUE(areas.place(
+      {.instance = "line1", .application = "A", .settings = {}, .retain = {}, .forces = slots}, {}, tasks));
+  MallocCount::begin();
+  for (int cycle = 0; cycle < 10'000; ++cycle) {
+    slots[0].list = cycle % 3 == 2 ? nullptr : &lists[static_cast<std::size_t>(cycle % 3)];
+    run_whole_cycle(tasks[0]);
+    ASSERT_EQ(values[2], cycle % 3 == 0 ? 1 : 2);
+  }
+  EXPECT_EQ(MallocCount::end(), 0U);
+  EXPECT_EQ(text[19], 'x');
+}
+
 TEST(NoAllocation, WhenATaskGivesItsRetainAreasAtTheEndOfACycle) {
   CycleCounter counter{2};
   const std::vector<std::byte> live(4096, std::byte{1});

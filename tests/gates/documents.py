@@ -7,7 +7,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 * Each link leads to a file or folder, and its anchor to a heading there.
 * Each document is reached from README.md by links; README.md has at most 250 lines.
 * A table between "<!-- generated: NAME -->" and "<!-- end of generated -->" is that of today (TABLES below; those of
-  the settings and of the configuration are held by instances_unit_test and unit_manager, here only their keys and meanings).
+  the settings, of the configuration and of Modbus are held by instances_unit_test, unit_manager and unit_modbus, here only their keys and meanings).
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
 * Each step of manager/walks.md names a function, a file that has it, and is called by the step around it (walks.py).
@@ -247,7 +247,7 @@ def phases(root):
 
 
 TABLES = {"figures": figures, "all-figures": all_figures, "topics": topics, "reload": reload_effects, "phases": phases}
-MADE_BY_TESTS = ("settings", "configuration", "commands")
+MADE_BY_TESTS = ("settings", "configuration", "commands", "modbus")
 
 
 def commands_of(programs):

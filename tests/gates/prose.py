@@ -60,7 +60,7 @@ C_TOKEN = re.compile(
 # Of a comment: columns, arrows, a line of usage.
 DRAWING = re.compile(r"\S   +\S|-->|──|\|  |^  +\S.*\[-")
 # Columns, a declaration in Structured Text, a line for the generators.
-NO_PROSE = re.compile(r"\S {3,}\S|\w : \w|^row: ")
+NO_PROSE = re.compile(r"\S {3,}\S|\w : \w|^(row|columns): ")
 # In a comment of api/control.idl: a line for the generators.
 TAG = re.compile(r"(topic|writer|reader|qos|row|columns|list|library|order|uncounted): ")
 C_FILES = (".cpp", ".hpp", ".h", ".c", ".idl", ".h.in", ".hpp.in")

@@ -47,21 +47,26 @@ void add_build_verb(const Command& plcctl, CliSession& session) {
   const auto order = std::make_shared<BuildOrder>();
   plcctl.verb("build", "Translate a program into an application, on this machine")
       .noun("application",
-            "Translate Structured Text with MATIEC. Each TASK becomes a task, located variables lie in the "
-            "areas "
-            "inputs, outputs and memory",
+            "Translate Structured Text, or PLCopen XML with bodies in it, with MATIEC or STruC++. Each TASK "
+            "becomes a task, located variables lie in the areas inputs, outputs and memory",
             [&session, order] { return build(session, *order); })
-      .arguments("SOURCE", order->sources,
-                 "files, or folders whose *.st are meant; one CONFIGURATION in all of them")
+      .arguments(
+          "SOURCE", order->sources,
+          "files (*.xml: PLCopen XML), or folders whose *.st are meant; one CONFIGURATION in all of them")
       .file("-o,--application", order->output,
             "where the application goes; of several resources each has its name in it")
       .option(
           "--tasks", order->tasks,
           "external events, watchdogs and other options of the tasks, as TOML (else X.toml beside a single "
-          "X.st)",
+          "X.st or X.xml)",
           "")
-      .option("--matiec", order->matiec, "folder of the compiler iec2c with its lib (else in PATH)",
-              "PLCHOST_MATIEC")
+      .option("--compiler", order->compiler,
+              "matiec or strucpp (else the one of which the folder is named, or that is found, first MATIEC)",
+              "")
+      .option("--matiec", order->matiec,
+              "folder of the compiler iec2c with its lib (else by PLCHOST_MATIEC, else in PATH)", "")
+      .option("--strucpp", order->strucpp,
+              "folder of the built compiler STruC++ (else by PLCHOST_STRUCPP, else by strucpp in PATH)", "")
       .option("--keep", order->keep,
               "leave the files between in this folder: a new or empty one, or one of an earlier --keep", "");
 }

@@ -85,6 +85,10 @@ void add(const Command& plcctl, CliSession& session, const Operation& operation)
     case OperationArgument::path:
     case OperationArgument::file:
       return add_with_argument(verb, session, operation, "FILE");
+    case OperationArgument::variable_or_all:
+      return add_with_argument(verb, session, operation, "VARIABLE");
+    case OperationArgument::variable_value:
+      return add_with_argument(verb, session, operation, "VARIABLE=VALUE");
   }
 }
 

@@ -16,6 +16,7 @@
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/task_rows.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
+#include "api/cli/verbs/variable_recording.hpp"
 #include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
 
@@ -93,7 +94,8 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 
 void add_list_verbs(const Command& plcctl, CliSession& session) {
   const std::string text = fmt::format(
-      "Show all hosts, instances, tasks, {}objects, nodes, exceptions, applications or transitions",
+      "Show all hosts, instances, tasks, {}objects, nodes, variables, forces, exceptions, applications or "
+      "transitions",
       dds::OfCountedStatus<ListedTopics>::nouns());
   const Command verb = plcctl.verb("list", text.c_str());
   add_list_hosts(verb, session);
@@ -107,6 +109,7 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
   dds::OfCountedStatus<ListedTopics>::add(verb, session);
   add_list_objects(verb, session);
   add_list_nodes(verb, session);
+  add_list_variables(verb, session);
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
     return list(session, std::function<bool(const plc_ExceptionStatus&)>(has_happened));
   });

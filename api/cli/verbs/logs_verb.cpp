@@ -119,11 +119,6 @@ void print_news(const CliSession& session, const LogArguments& arguments, const 
   std::fflush(stdout);
 }
 
-// A server that is started anew answers again.
-bool comes_back(const Error& error) {
-  return error.code == ErrorCode::timed_out || error.code == ErrorCode::unavailable;
-}
-
 int follow(const CliSession& session, LogFollower& log, const LogArguments& arguments) {
   constexpr Duration kPeriod = std::chrono::milliseconds(250);
   bool silent = false;

@@ -7,6 +7,7 @@
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/task_rows.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
+#include "api/cli/verbs/variable_recording.hpp"
 
 namespace plchost {
 
@@ -33,7 +34,8 @@ int watch(CliSession& session, const WatchArguments& arguments) {
 
 void add_watch_verb(const Command& plcctl, CliSession& session) {
   const Command verb = plcctl.verb(
-      "watch", "Show changes of state as they come, or look at tasks or one object again and again");
+      "watch",
+      "Show changes of state as they come, or look at tasks, one object or variables again and again");
   const auto arguments = std::make_shared<WatchArguments>();
   constexpr double kMinInterval = 0.1;
   constexpr double kMaxInterval = 3600;
@@ -45,6 +47,7 @@ void add_watch_verb(const Command& plcctl, CliSession& session) {
       .option("--count", arguments->count, "end after so many looks", std::uint64_t{0}, kMaxCount);
   add_watch_transitions(verb, session);
   add_watch_object(verb, session);
+  add_watch_variables(verb, session);
 }
 
 }  // namespace plchost

@@ -192,6 +192,11 @@ void define_states(py::module_& module) {
 }
 
 void define_results(py::module_& module) {
+  py::class_<Client::Sample>(module, "Sample",
+                             "Variables of an application, with their values of one moment.")
+      .def_readonly("time", &Client::Sample::time)
+      .def_readonly("consistent", &Client::Sample::consistent)
+      .def_readonly("variables", &Client::Sample::variables);
   py::class_<Client::Clock>(module, "Clock", "The clock of a host, as seen from here.")
       .def_property_readonly("offset", member_seconds(&Client::Clock::offset))
       .def_property_readonly("uncertainty", member_seconds(&Client::Clock::uncertainty));
@@ -274,6 +279,9 @@ void define_calls(ClientClass& client) {
            "The nodes that send each other blocks.", NoGil())
       .def("routes", &Client::routes, py::arg("host") = "", py::arg("base") = "",
            "How blocks go from one node to another, or to other hosts.", NoGil())
+      .def("variables", &Client::variables, py::arg("host"), py::arg("instance"),
+           py::arg("patterns") = std::vector<std::string>(), NoGil())
+      .def("sample", &Client::sample, py::arg("host"), py::arg("instance"), py::arg("patterns"), NoGil())
       .def("check_host", &Client::check_host, py::arg("host") = "",
            "Has the host looked at anew. Returns the result of each check.", NoGil())
       .def("read_clock", &Client::read_clock, py::arg("host") = "", NoGil())

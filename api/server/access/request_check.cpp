@@ -29,6 +29,18 @@ std::string known_operations() {
   return list;
 }
 
+// The instance knows its variables and their types.
+Result<void> check_variable_argument(const Operation& operation, std::string_view argument) {
+  const bool has_value = operation.argument == Argument::variable_value;
+  const std::size_t end = argument.find('=');
+  const bool good = has_value ? end != std::string_view::npos && end > 0
+                              : end == std::string_view::npos && !argument.empty();
+  if (good && is_printable_utf8(argument)) return {};
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("{}: '{}' is not of the form {}", operation.name, shown(argument),
+                             has_value ? "NAME=VALUE" : "NAME"));
+}
+
 Result<void> check_argument(const Operation& operation, std::string_view argument) {
   switch (operation.argument) {
     case Argument::none:
@@ -46,6 +58,9 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
       return check_name("event", argument, kMaxEventName);
     case Argument::task_or_none:
       return argument.empty() ? Result<void>() : check_name("task", argument, kMaxTaskName);
+    case Argument::variable_or_all:
+    case Argument::variable_value:
+      return check_variable_argument(operation, argument);
   }
   return {};
 }

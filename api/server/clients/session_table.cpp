@@ -16,8 +16,8 @@ namespace plchost {
 namespace {
 
 // By SessionTable::Stream.
-constexpr std::array kStreamTopics{dds::kReply,   dds::kEventAck, dds::kObjectPage, dds::kNodePage,
-                                   dds::kLogPage, dds::kEventRun, dds::kDownloadAck};
+constexpr std::array kStreamTopics{dds::kReply,   dds::kEventAck, dds::kObjectPage,  dds::kNodePage,
+                                   dds::kLogPage, dds::kEventRun, dds::kDownloadAck, dds::kVariablePage};
 
 }  // namespace
 
@@ -183,6 +183,10 @@ bool SessionTable::write_page(const dds::Guid& client, const plc_NodePage& page)
 
 bool SessionTable::write_page(const dds::Guid& client, const plc_LogPage& page) {
   return write(client, Stream::logs, &page);
+}
+
+bool SessionTable::write_page(const dds::Guid& client, const plc_VariablePage& page) {
+  return write(client, Stream::variables, &page);
 }
 
 bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sample) {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
+#include "api/server/status/host_grid.hpp"
 
 namespace plchost {
 
@@ -13,10 +14,10 @@ namespace {
 // The states of control.idl; a stranger may have written another one.
 constexpr std::uint32_t kClockStates = 6;
 
-// A value that moves by a little with each look would make each look news.
-std::int64_t to_hundreds(std::int64_t value) noexcept {
-  constexpr std::int64_t kHundred = 100;
-  return (value + (value < 0 ? -kHundred / 2 : kHundred / 2)) / kHundred * kHundred;
+void add(std::string& problem, std::string_view more) {
+  if (more.empty()) return;
+  problem += problem.empty() ? "" : "; ";
+  problem += more;
 }
 
 void put_clock(const ClockRuntime& clock, plc_InstanceStatus& sample) noexcept {
@@ -40,14 +41,17 @@ void put_runtime(const InstanceRuntime& runtime, plc_InstanceStatus& sample) noe
   dds::copy_text(sample.tick_source, runtime.tick_source.view());
   dds::copy_text(sample.tick_fallback, runtime.tick_fallback.view());
   dds::copy_text(sample.idle_states, runtime.idle_states.view());
+  sample.variables = runtime.variables;
+  sample.forces = runtime.forces;
   put_clock(runtime.clock, sample);
 }
 
 std::string problem_of_instance(const InstanceStatus& status, const InstanceRuntime* runtime) {
   std::string problem(status.problem.view());
   if (runtime == nullptr || runtime->pid != status.pid) return problem;
-  const std::string_view retain = runtime->retain_problem.view();
-  return problem.empty() || retain.empty() ? problem.append(retain) : fmt::format("{}; {}", problem, retain);
+  add(problem, runtime->retain_problem.view());
+  if (runtime->forces > 0) add(problem, fmt::format("{} values of variables are forced", runtime->forces));
+  return problem;
 }
 
 }  // namespace plchost

@@ -114,6 +114,7 @@ bool StatusPublisher::flush(const std::vector<std::string>& instances, TimePoint
 bool StatusPublisher::look_at_instances(TimePoint now) {
   bool changed = false;
   running_ = 0;
+  grid_ = {};
   auto& table = tables_->of<plc_InstanceStatus>();
   table.begin_round();
   exceptions_.begin_round();
@@ -155,7 +156,10 @@ bool StatusPublisher::update_instance(const InstanceStatus& status, TimePoint no
   dds::copy_text(sample.application, status.application.view());
   dds::copy_text(sample.problem, problem_of_instance(status, runtime ? &*runtime : nullptr));
   const bool is_its_own = runtime && status.pid != 0 && runtime->pid == status.pid;
-  if (is_its_own) dds::copy_text(sample.loaded, runtime->application.view());
+  if (is_its_own) {
+    dds::copy_text(sample.loaded, runtime->application.view());
+    grid_.add(runtime->clock);
+  }
   put_plan(status.plan, sample);
   if (is_its_own && !runtime->retain_problem.view().empty()) {
     unsaved += fmt::format("{}{}", unsaved.empty() ? "" : ",", name);
@@ -230,6 +234,7 @@ void StatusPublisher::write_host(bool changed) {
   sample.running = running_;
   sample.objects = objects_;
   load_.put(sample);
+  grid_.put(sample);
   sample.audit_number = audit_.number;
   dds::copy_text(sample.audit_hash, audit_.hash);
   dds::copy_text(sample.unrecorded, audit_.problem);

@@ -13,6 +13,7 @@
 #include "api/dds/topics.hpp"
 #include "api/server/status/application_watch.hpp"
 #include "api/server/status/exception_watch.hpp"
+#include "api/server/status/host_grid.hpp"
 #include "api/server/status/host_load.hpp"
 #include "api/server/status/status_table.hpp"
 #include "api/server/status/status_tables.hpp"
@@ -100,6 +101,7 @@ class StatusPublisher {
   AuditState audit_;
   std::string rival_;
   HostLoad load_;
+  HostGrid grid_;
   std::uint32_t running_ = 0;  ///< instances
   std::uint32_t objects_ = 0;  ///< of the pool
   std::string unsaved_;        ///< instances whose newest retain values are in no file, with commas between

@@ -27,6 +27,7 @@ struct Variable {
   bool retain = false;
   bool constant = false;
   SourcePlace place;
+  std::string member = {};  ///< its name in the output of STruC++; empty: its own, folded
 };
 
 struct Pou {

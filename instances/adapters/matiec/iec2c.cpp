@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/environment.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 
 namespace plchost::matiec {
@@ -39,11 +40,6 @@ std::optional<Compiler> compiler_of(const fs::path& program) {
     }
   }
   return std::nullopt;
-}
-
-std::string environment(const char* name) {
-  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): plcctl has one thread here
-  return value == nullptr ? "" : value;
 }
 
 constexpr std::size_t kMaxLine = 4096;  // the library's expressions need more stack for longer ones
@@ -80,7 +76,7 @@ unsigned number_of(const std::ssub_match& match) {
 }  // namespace
 
 Result<Compiler> find_compiler(const std::string& folder) {
-  const std::string chosen = folder.empty() ? environment("PLCHOST_MATIEC") : folder;
+  const std::string chosen = folder.empty() ? iec::environment("PLCHOST_MATIEC") : folder;
   if (!chosen.empty()) {
     for (const fs::path& program :
          {fs::path(chosen) / "iec2c", fs::path(chosen) / "bin" / "iec2c", fs::path(chosen)}) {
@@ -88,15 +84,13 @@ Result<Compiler> find_compiler(const std::string& folder) {
     }
     return failure(ErrorCode::not_found, fmt::format("there is no iec2c with its lib folder in {}", chosen));
   }
-  const std::string path = environment("PATH");
-  for (const auto part : std::views::split(path, ':')) {
-    if (auto found = compiler_of(fs::path(std::string(part.begin(), part.end())) / "iec2c"))
-      return *std::move(found);
+  for (const fs::path& program : iec::in_path("iec2c")) {
+    if (auto found = compiler_of(program)) return *std::move(found);
   }
   return failure(
       ErrorCode::not_found,
-      "no compiler for Structured Text was found. Build MATIEC (github.com/beremiz/matiec), and name its "
-      "folder by --matiec or PLCHOST_MATIEC");
+      "MATIEC was not found. Build it (github.com/beremiz/matiec), and name its folder by --matiec or "
+      "PLCHOST_MATIEC");
 }
 
 iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,

@@ -108,6 +108,13 @@ void setup(plc::Application& app) {
   app.event("Cap", 2, [] { return bottle_full.load(); }, cap);
   app.cyclic("Conveyor", 3, 50ms, conveyor);
   app.cyclic("Report", 20, 1s, report);
+  app.variable("Line.halted", halted);
+  app.variable("Line.bottle_there", bottle_there);
+  app.variable("Line.bottle_full", bottle_full);
+  app.variable("Line.capped", capped);
+  app.variable("Line.stops", stops);
+  app.variable("Fill.last_weight_mg", last_weight_mg, {"Fill"});
+  app.variable("Fill.after_run_mg", after_run_mg, {"Fill"});
 }
 
 }  // namespace

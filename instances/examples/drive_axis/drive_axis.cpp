@@ -74,6 +74,14 @@ void setup(plc::Application& app) {
   app.external("Reset", 2, "reset", reset);
   app.cyclic("Sequence", 3, 20ms, sequence);
   app.cyclic("Report", 20, 1s, report);
+  app.variable("Axis.target", target);
+  app.variable("Axis.actual", actual, {"Position"});
+  app.variable("Axis.following_error", following_error, {"Position"});
+  app.variable("Axis.max_following_error", max_following_error, {"Position"});
+  app.variable("Axis.outside_window", outside_window, {"Position"});
+  app.variable("Axis.held", held);
+  app.variable("Axis.moves", moves);
+  app.variable("Axis.faults", faults);
 }
 
 }  // namespace

@@ -104,10 +104,22 @@ static RTS_RESULT declare_areas(void) {
   return result;
 }
 
+/* The pallets as the panel shows them, for "plcctl read". */
+static void declare_variables(void) {
+  static Plc_Variable pallets;
+  pallets.dwSize = sizeof pallets;
+  pallets.pszName = "Panel.pallets";
+  pallets.dwType = PLC_TYPE_UDINT;
+  pallets.pAddress = (void*)(size_t)&panel_pallets; /* without its volatile */
+  pallets.pszTask = "Palletise";
+  plc_declare_variable(&pallets);
+}
+
 int CDECL plc_app_init(void) {
   RTS_RESULT result = declare_areas();
   if (result != ERR_OK) return (int)result;
   __sys__setup__tasks(&configuration);
+  declare_variables();
   product_event = SchedRegisterExternalEvent("product", &result);
   return product_event == RTS_INVALID_HANDLE ? (int)result : 0;
 }

@@ -8,6 +8,7 @@
 #include "instances/plc_app.h"
 #include "instances/runtime/memory/declared_area.hpp"
 #include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/variables/declared_variable.hpp"
 
 namespace plchost {
 
@@ -38,6 +39,7 @@ struct ApplicationDeclaration {
   std::vector<RTS_HANDLE> events;    ///< own ones that it registers
   std::vector<EventCallback> callbacks;
   std::vector<DeclaredArea> areas;  ///< at the first load Areas gets them
+  VariableCollection seen;          ///< variables that are seen from outside; VariableService gets them
 };
 
 }  // namespace plchost

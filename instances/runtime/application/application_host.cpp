@@ -167,6 +167,12 @@ RTS_HANDLE ApplicationHost::declare_area(const Plc_Area* area, RTS_RESULT& resul
   return RTS_INVALID_HANDLE;
 }
 
+RTS_RESULT ApplicationHost::declare_variable(const Plc_Variable* variable) {
+  if (collected_ != nullptr) return collected_->seen.declare(variable);
+  spdlog::error("plc_declare_variable: variables are declared in plc_app_init only");
+  return ERR_NOTINITIALIZED;
+}
+
 RTS_RESULT ApplicationHost::register_event(RTS_HANDLE event) {
   if (collected_ != nullptr && events_.is_own(event)) {
     // By the application that runs it is no obstacle; by a component it is.

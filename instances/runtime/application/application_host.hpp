@@ -16,6 +16,7 @@
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
 #include "instances/runtime/tasks/task_table.hpp"
+#include "instances/runtime/variables/variable_service.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -53,6 +54,7 @@ class ApplicationHost {
   [[nodiscard]] TaskTable& task_table() noexcept { return task_table_; }
   [[nodiscard]] Areas& areas() noexcept { return areas_; }
   [[nodiscard]] const Areas& areas() const noexcept { return areas_; }
+  [[nodiscard]] VariableService& variables() noexcept { return variables_; }
 
   /// The declaration of the running application.
   [[nodiscard]] const ApplicationDeclaration& declaration() const noexcept { return declaration_; }
@@ -108,6 +110,7 @@ class ApplicationHost {
   [[nodiscard]] RTS_RESULT set_task_options(const char* task, const Task_Options* options);
   [[nodiscard]] RTS_RESULT keep_variables(const std::string& name, const CarriedVariables& variables);
   [[nodiscard]] RTS_HANDLE declare_area(const Plc_Area* area, RTS_RESULT& result);
+  [[nodiscard]] RTS_RESULT declare_variable(const Plc_Variable* variable);
   [[nodiscard]] RTS_RESULT register_event(RTS_HANDLE event);
   [[nodiscard]] RTS_RESULT unregister_event(RTS_HANDLE event);
   [[nodiscard]] RTS_RESULT add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
@@ -132,6 +135,7 @@ class ApplicationHost {
   BlockService blocks_;
   MessageQueue messages_;
   TaskTable task_table_;
+  VariableService variables_;  // the cycles of areas_ use its forces
   Areas areas_;
   int start_kind_ = PLC_START_FIRST;
   ApplicationDeclaration declaration_;

@@ -86,7 +86,8 @@ Areas::Environment areas_environment(const LoadContext& context, const Applicati
                      .mismatch = settings.retain.mismatch,
                      .postpone = settings.retain.postpone,
                      .cold = context.launch.start_kind == StartKind::cold},
-          .room = context.host.events().room()};
+          .room = context.host.events().room(),
+          .forces = context.host.variables().slots()};
 }
 
 // As a whole: `declared` is complete then.
@@ -101,6 +102,7 @@ Result<void> check_declaration(const LoadContext& context, DeclaredApplication& 
   std::vector<std::string> names;
   for (const TaskConfig& task : application.tasks()) names.push_back(task.name);
   PLCHOST_TRY(complete_uses(declared.declaration.areas, names));
+  PLCHOST_TRY(check_variables(declared.declaration.seen.variables(), names));
   // Those of another version go on where they are: OnlineChange compares them.
   if (context.host.has_application()) return {};
   return Areas::check(areas_environment(context, application), declared.declaration.areas);
@@ -126,6 +128,9 @@ Result<Commit> Commit::prepare(const LoadContext& context, Application& applicat
     host.areas().tell_addresses(commit.declaration_.areas);
     return commit;
   }
+  std::vector<std::string> tasks;
+  for (const TaskConfig& task : application.tasks()) tasks.push_back(task.name);
+  host.variables().place(commit.declaration_.seen.take(), std::move(tasks));
   PLCHOST_TRY_ASSIGN(commit.remark_,
                      host.areas().place(areas_environment(context, application),
                                         std::move(commit.declaration_.areas), application.tasks_to_change()));

@@ -49,6 +49,7 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                std::chrono::duration<double>(kLongestSetup).count()));
   }
   PLCHOST_TRY(change->compare(next.declaration));
+  change->variables_ = context.host.variables().prepare(next.declaration.seen.take());
   PLCHOST_TRY_ASSIGN(auto commit, Commit::prepare(context, change->next_, std::move(next.declaration)));
   change->commit_.emplace(std::move(commit));
   change->connect();
@@ -98,6 +99,7 @@ void OnlineChange::take_over() noexcept {
     code = *codes_[i];
   }
   host_.task_table().exchange(infos_);
+  host_.variables().take_over(variables_);
   running_.exchange(next_);
 }
 
@@ -111,10 +113,14 @@ void OnlineChange::finish(const std::function<void()>& notify) {
 std::string OnlineChange::describe() const {
   std::size_t bytes = 0;
   for (const Copy& copy : copies_) bytes += copy.bytes;
-  return fmt::format("{} areas go on, {}", host_.areas().declared().size(),
-                     copied_.empty() ? std::string("no variables were carried over")
-                                     : fmt::format("variables {} were carried over ({} bytes)",
-                                                   first_of(copied_, ", "), bytes));
+  std::string text = fmt::format("{} areas go on, {}", host_.areas().declared().size(),
+                                 copied_.empty() ? std::string("no variables were carried over")
+                                                 : fmt::format("variables {} were carried over ({} bytes)",
+                                                               first_of(copied_, ", "), bytes));
+  if (!variables_.ended.empty())
+    text +=
+        fmt::format("; forces end, of variables that are not the same: {}", first_of(variables_.ended, ", "));
+  return text;
 }
 
 }  // namespace plchost

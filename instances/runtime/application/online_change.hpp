@@ -63,6 +63,7 @@ class OnlineChange {
   std::vector<Task_Info*> infos_;  // the same
   std::vector<Copy> copies_;
   std::vector<std::string> copied_;  // names
+  VariableService::Next variables_;  // seen from outside
 };
 
 }  // namespace plchost

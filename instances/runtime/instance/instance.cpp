@@ -153,6 +153,10 @@ Result<std::string> Instance::open_control_socket() {
                              });
   if (!server) return std::unexpected(std::move(server).error());
   control_.emplace(*std::move(server));
+  PLCHOST_TRY_ASSIGN(auto values, ValueServer::listen(
+                                      values_socket_path(options_.launch.run_directory, options_.launch.name),
+                                      host_->variables()));
+  values_.emplace(std::move(values));
   PLCHOST_TRY(restore_operator_events());
   return {};
 }
@@ -213,6 +217,7 @@ Result<std::string> Instance::make_status_page() {
   PLCHOST_TRY_ASSIGN(auto page, InstancePage::create(options_.launch.pool, options_.launch.name, identities,
                                                      start_.settings.fine_tasks));
   page_.emplace(std::move(page));
+  PLCHOST_TRY(host_->variables().publish(options_.launch.pool, options_.launch.name));
   PLCHOST_TRY_ASSIGN(auto transitions, TransitionRing::open(options_.launch.pool, options_.launch.name));
   transitions_.emplace(std::move(transitions));
   return {};
@@ -243,10 +248,8 @@ Result<std::string> Instance::make_tasks() {
   PLCHOST_TRY_ASSIGN(tasks_,
                      TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment)));
   host_->task_table().attach(tasks_.get());
-  if (const std::string& reference = start_.settings.scheduler.distributed_clock.reference;
-      !reference.empty()) {
-    reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
-  }
+  reference_ = follow_reference(tasks_->distributed_clock(), start_.settings.scheduler.distributed_clock,
+                                options_.launch.pool);
   notify_tasks(EVT_ExternalEventTaskCreateDone);
   host_->notify(EVT_PrepareStart, {});
   for (const std::string& line :
@@ -292,6 +295,7 @@ void Instance::report_tick() {
 void Instance::beat() {
   host_->write_messages();
   if (control_) control_->beat();
+  if (values_) values_->beat();
   report_tick();
   if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
   if (tasks_) tasks_->look_after_posts();
@@ -299,7 +303,7 @@ void Instance::beat() {
     for (const std::string& news : tasks_->look_after_processor()) spdlog::warn("{}", news);
   }
   host_->events().refresh();
-  reference_.refresh();
+  if (reference_) reference_->refresh();
   InstanceRuntime runtime;
   runtime.pid = ::getpid();
   runtime.core = cores_.size() == 1 ? cores_.front() : -1;
@@ -315,7 +319,9 @@ void Instance::beat() {
   if (application_) runtime.application.assign(application_->path());
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
   runtime.clock.reference.assign(start_.settings.scheduler.distributed_clock.reference);
-  runtime.clock.problem.assign(reference_.problem());
+  if (reference_) runtime.clock.problem.assign(reference_->problem());
+  runtime.variables = static_cast<std::uint32_t>(host_->variables().count());
+  runtime.forces = static_cast<std::uint32_t>(host_->variables().forces().size());
   runtime.retain_problem.assign(host_->areas().retain_problem());
   page_->write_runtime(runtime);
   look_after_page();

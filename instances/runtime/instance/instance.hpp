@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,13 +14,14 @@
 #include "instances/runtime/application/online_change.hpp"
 #include "instances/runtime/instance/application_state.hpp"
 #include "instances/runtime/instance/instance_socket.hpp"
+#include "instances/runtime/instance/value_server.hpp"
 #include "instances/runtime/settings/device_description.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup/idle_states.hpp"
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/setup/process_setup.hpp"
 #include "instances/runtime/setup/setup_reporter.hpp"
-#include "instances/runtime/time/reference_memory.hpp"
+#include "instances/runtime/time/reference.hpp"
 #include "schedulers/task_set.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/transition_ring.hpp"
@@ -44,6 +46,9 @@ class Instance {
   /// Readable when serve_control() has something to do; -1: no control socket.
   [[nodiscard]] int control_fd() const noexcept { return control_ ? control_->fd() : -1; }
   void serve_control() { control_->serve(); }
+  /// The same of serve_values().
+  [[nodiscard]] int values_fd() const noexcept { return values_ ? values_->fd() : -1; }
+  void serve_values() { values_->serve(); }
 
   /// Readable when serve_faults() has something to do; -1: there are no tasks.
   [[nodiscard]] int fault_fd() const noexcept { return tasks_ ? tasks_->fault_fd() : -1; }
@@ -57,8 +62,8 @@ class Instance {
   void beat();
   static constexpr auto kHeartbeat = std::chrono::milliseconds(100);
 
-  /// Goes on with a stop, a single cycle or an online change that is under way. Never waits. To be called now
-  /// and then.
+  /// Goes on with a stop, a single cycle, an online change, or requests for variables that are under way.
+  /// Never waits. To be called now and then.
   void advance();
   /// How soon advance() wants to be called; nothing: no need.
   [[nodiscard]] std::optional<Duration> wants_advance_in() const noexcept;
@@ -118,6 +123,24 @@ class Instance {
   [[nodiscard]] std::string finish_change(Duration held);
   void drop_change(const std::string& why);
 
+  // Variables that are seen from outside: instance_variables.cpp
+  /// A change of variables that waits for a moment between all cycles.
+  struct PendingOrder {
+    InstanceSocket::Asker asker;
+    ControlVerb verb = ControlVerb::write_variable;
+    std::string argument;
+    TimePoint limit;
+    std::optional<VariableOrder> order;  ///< nothing: others came first
+  };
+  [[nodiscard]] Result<std::string> begin_order(const ControlRequest& request);
+  [[nodiscard]] Result<void> admit_order() const;
+  void advance_orders();
+  void advance_values();
+  /// Calls it between all cycles. False: there was no such moment.
+  [[nodiscard]] bool in_moment(const std::function<void()>& action);
+  void drop_orders(ErrorCode code, const std::string& why);
+  void log_ended_forces(std::string_view why);
+
   // The life of the application: instance_life.cpp
   [[nodiscard]] ApplicationLife::Record recorder();
   /// All steps of a start that can fail.
@@ -156,14 +179,16 @@ class Instance {
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
   bool page_lost_told_ = false;
-  TimePoint page_told_;             // when it was told last that the page was written over
-  std::uint64_t page_damages_ = 0;  // how often it was
-  ReferenceMemory reference_;
+  TimePoint page_told_;                   // when it was told last that the page was written over
+  std::uint64_t page_damages_ = 0;        // how often it was
+  std::unique_ptr<Reference> reference_;  // null: none is named
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them
   std::unique_ptr<OnlineChange> change_;  // waits for a moment between all cycles
   TimePoint change_ends_;                 // at the latest
   std::optional<InstanceSocket> control_;
+  std::optional<ValueServer> values_;
+  std::deque<PendingOrder> orders_;
   std::optional<TransitionRing> transitions_;
   ApplicationLife life_;
   std::vector<bool> unbound_;  // tasks of external events that run nothing any more, since the last start

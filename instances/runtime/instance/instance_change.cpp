@@ -20,6 +20,7 @@ constexpr auto kChangePatience = std::chrono::seconds(6);
 // Text: it has taken over. Empty: it will, or not, and the client hears of it then.
 Result<std::string> Instance::begin_change(const std::string& path) {
   if (change_) return failure(ErrorCode::busy, "an online change is under way: try again when it is done");
+  if (!orders_.empty()) return failure(ErrorCode::busy, "a variable is to be written: try again when it is");
   if (const auto faulty = tasks_->tasks_in_exception(); !faulty.empty()) {
     return failure(ErrorCode::wrong_state,
                    fmt::format("in exception: task {}, which may be in the code that would go; reset first",
@@ -53,6 +54,8 @@ std::string Instance::finish_change(Duration held) {
   // The callbacks find the new version in application_.
   change_->finish([this] { notify_tasks(EVT_ExternalEventTaskCreateDone); });
   change_.reset();
+  if (auto shown = host_->variables().publish(options_.launch.pool, options_.launch.name); !shown)
+    spdlog::error("{}; the variables of the new version cannot be seen", shown.error().describe());
   const double us = std::chrono::duration<double, std::micro>(held).count();
   life_.stay(fmt::format("online change to {}", application_->path()));
   std::string text = fmt::format("taken over between two cycles, within {:.0f} us: {}", us, carried);

@@ -24,6 +24,14 @@ std::optional<ControlReply> Instance::handle(const ControlRequest& request,
     waiting_ = Waiting{.asker = asker, .verb = request.verb};
     return std::nullopt;
   }
+  const bool is_order = request.verb == ControlVerb::write_variable ||
+                        request.verb == ControlVerb::force_variable ||
+                        request.verb == ControlVerb::unforce_variable;
+  if (done && is_order) {
+    orders_.back().asker = asker;
+    advance_orders();
+    return std::nullopt;
+  }
   if (done && takes_time && in_transition()) {
     answer_waiting(ErrorCode::wrong_state,
                    "stopped before it was over");  // a single cycle that is broken off
@@ -76,6 +84,12 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
           [](Instance& self, const auto& asked) { return self.change_registration(asked); }),
       Row(ControlVerb::unregister_event,
           [](Instance& self, const auto& asked) { return self.change_registration(asked); }),
+      Row(ControlVerb::write_variable,
+          [](Instance& self, const auto& asked) { return self.begin_order(asked); }),
+      Row(ControlVerb::force_variable,
+          [](Instance& self, const auto& asked) { return self.begin_order(asked); }),
+      Row(ControlVerb::unforce_variable,
+          [](Instance& self, const auto& asked) { return self.begin_order(asked); }),
       Row(ControlVerb::reset_statistics,
           [](Instance& self, const auto& asked) { return self.reset_statistics(asked.argument); }),
       Row(ControlVerb::shutdown,

@@ -80,7 +80,9 @@ bool Instance::in_transition() const noexcept {
 }
 
 void Instance::advance() {
+  advance_orders();
   if (change_) advance_change();
+  advance_values();
   if (!in_transition()) return;
   if (life_.state() == ApplicationState::single_cycle && !tasks_->stop_begun()) {
     const bool done = tasks_->single_cycle_done();
@@ -153,13 +155,16 @@ bool Instance::ended() const noexcept {
 }
 
 std::optional<Duration> Instance::wants_advance_in() const noexcept {
-  if (!in_transition() && !change_) return std::nullopt;
+  const bool for_variables = !orders_.empty() || (values_ && values_->has_work());
+  if (!in_transition() && !change_ && !for_variables) return std::nullopt;
   return kSoon;
 }
 
 Result<void> Instance::shut_down() {
   is_down_ = true;
   drop_change("the process ends");
+  drop_orders(ErrorCode::unavailable, "the process ends");
+  log_ended_forces("the process ends");
   Result<void> stopped;
   if (tasks_) {
     tasks_->park_all();
@@ -174,7 +179,10 @@ Result<void> Instance::shut_down() {
     }
   }
   // Before its code is called once more: if that ends the process, nothing of ours is left behind.
-  if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
+  if (page_) {
+    InstancePage::remove(options_.launch.pool, options_.launch.name);
+    SymbolPage::remove(options_.launch.pool, options_.launch.name);
+  }
   // Under a manager there will be a next process: the numbers go on, and it may need the settings.
   if (options_.launch.report_fd < 0) {
     // Of another process of that name, if the set-up of this one has ended before.
@@ -189,14 +197,15 @@ Result<void> Instance::shut_down() {
     if (host_) host_->areas().finish();  // also what these two have changed
     // Only now: until then a thread of a component may have used a task's handle.
     if (host_) host_->task_table().attach(nullptr);
-    reference_.drop();
     tasks_.reset();
+    reference_.reset();
   }
   if (host_) {
     host_->write_messages();
     host_->events().withdraw_own();
   }
   control_.reset();
+  values_.reset();
   return stopped;
 }
 

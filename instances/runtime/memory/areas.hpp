@@ -16,6 +16,7 @@
 #include "instances/runtime/memory/retain_keeper.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
 #include "instances/runtime/memory/task_cycle.hpp"
+#include "instances/runtime/variables/force_list.hpp"
 #include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/pool_room.hpp"
@@ -33,6 +34,7 @@ class Areas {
     std::span<const AreaSettings> settings;
     RetainKeeper::Options retain;
     PoolRoom* room = nullptr;  ///< null: check() does not look whether new memories find a place
+    std::span<const ForceSlot> forces = {};  ///< of each task; empty: nothing is ever forced
   };
 
   /// plc_declare_area: checks it and adds it to `areas`. The handle of another version's area is that of the
@@ -50,9 +52,9 @@ class Areas {
                                           std::span<const DeclaredArea> areas);
   /// Places the areas, with which check() has found no fault, fills them with retain values or with initial
   /// values, and tells the application the addresses. Then puts the exchange of inputs and outputs around the
-  /// cycles of the tasks that use them: the others stay as they are. A text: remarks. After an error, and if
-  /// these areas go without keep(), the pool has the memories that it had before, and the retain values are
-  /// those of before. Once, after the application was loaded; set-up.
+  /// cycles of the tasks that use them, and the forces around the code of all. A text: remarks. After an
+  /// error, and if these areas go without keep(), the pool has the memories that it had before, and the
+  /// retain values are those of before. Once, after the application was loaded; set-up.
   [[nodiscard]] Result<std::string> place(const Environment& environment, std::vector<DeclaredArea> areas,
                                           std::span<TaskConfig> tasks);
 
@@ -117,7 +119,7 @@ class Areas {
   void tell_view(std::size_t index, std::size_t task, std::byte* bytes);
   void count_cycles(std::span<const TaskConfig> tasks);
   [[nodiscard]] std::vector<RetainShare> shares_of_retain() const;
-  void wrap(std::span<TaskConfig> tasks);
+  void wrap(std::span<TaskConfig> tasks, std::span<const ForceSlot> forces);
   [[nodiscard]] const DeclaredArea& first_of(const AreaBlock& planned) const {
     return declared_[planned.areas.front()];
   }

@@ -152,13 +152,14 @@ Result<void> Areas::check(const Environment& environment, std::span<const Declar
 Result<std::string> Areas::place(const Environment& environment, std::vector<DeclaredArea> areas,
                                  std::span<TaskConfig> tasks) {
   declared_ = std::move(areas);
+  cycles_.resize(tasks.size());
   if (declared_.empty()) {
+    wrap(tasks, environment.forces);
     placed_ = true;
     return std::string();
   }
   for (const TaskConfig& task : tasks) tasks_.push_back(task.name);
   PLCHOST_TRY_ASSIGN(plan_, plan_areas(declared_, environment.settings));
-  cycles_.resize(tasks.size());
   plain_.resize(declared_.size(), nullptr);
   // All steps that can fail come before anything is written that others see.
   auto made = make_blocks(environment);
@@ -173,7 +174,7 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
   tell_plain_addresses();
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
   count_cycles(tasks);
-  wrap(tasks);
+  wrap(tasks, environment.forces);
   placed_ = true;
   return keeper_ ? fmt::format("{}", fmt::join(keeper_->remarks(), "; ")) : std::string();
 }
@@ -391,11 +392,14 @@ std::vector<Areas::RetainShare> Areas::shares_of_retain() const {
   return shares;
 }
 
-void Areas::wrap(std::span<TaskConfig> tasks) {
+void Areas::wrap(std::span<TaskConfig> tasks, std::span<const ForceSlot> forces) {
   for (std::size_t i = 0; i < tasks.size(); ++i) {
-    if (cycles_[i].empty()) continue;
     TaskCycle* const cycle = &cycles_[i];
+    const bool has_areas = !cycle->empty();
+    if (!forces.empty()) cycle->use_forces(forces[i]);
+    if (cycle->empty()) continue;
     tasks[i].entry = [cycle, entry = std::move(tasks[i].entry)] { cycle->run(entry); };
+    if (!has_areas) continue;
     tasks[i].before_entry = [cycle] { cycle->begin(); };
     tasks[i].after_entry = [cycle] { cycle->end(); };
     tasks[i].between_cycles = [cycle] { return cycle->give_retain(); };

@@ -38,7 +38,9 @@ void TaskCycle::begin() noexcept {
 
 void TaskCycle::run(const std::function<void()>& entry) const {
   const CycleHere here(this);
+  apply_forces();
   entry();
+  apply_forces();
 }
 
 void TaskCycle::end() noexcept {

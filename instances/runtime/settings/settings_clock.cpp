@@ -1,9 +1,9 @@
 // [DistributedClock]: how the grids of cyclic tasks follow a reference clock.
 #include <array>
 
+#include "instances/runtime/settings/reference_name.hpp"
 #include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
-#include "shm/pages/reference_clock.hpp"
 
 namespace plchost {
 
@@ -18,17 +18,17 @@ using ClockSettings = DistributedClockSettings;
 template <auto kMember>
 using ClockAt = At<&InstanceSettings::scheduler, &SchedulerSettings::distributed_clock, kMember>;
 
-bool is_memory_name(std::string_view text) {
-  return check_reference_name(text).has_value();
+bool is_reference(std::string_view text) {
+  return parse_reference(text).has_value();
 }
 
 constexpr std::array kClockKeys = {
     SettingKey{.section = kClock,
                .name = "Reference",
-               .meaning = "record that the grids of cyclic tasks follow; without it a driver reports pairs "
-                          "(SchedReportReferenceTime)",
-               .value = text_setting<ClockAt<&ClockSettings::reference>>(
-                   "name of a shared memory of the pool, 1 to 95 letters, digits, _ - .", is_memory_name)},
+               .meaning =
+                   "clock or record that the grids of cyclic tasks follow; without it a driver reports "
+                   "pairs (SchedReportReferenceTime)",
+               .value = text_setting<ClockAt<&ClockSettings::reference>>(kReferenceForm, is_reference)},
     SettingKey{.section = kClock,
                .name = "KpPpm",
                .unit = "ppm",

@@ -25,8 +25,9 @@ using testing::HasSubstr;
 using ClientLists = ClientLibrary;
 
 TEST_F(ClientLists, HasAllOperationsOfTheContract) {
-  std::set<std::string> known{"check host",  "list objects", "list nodes",  // functions of their own
-                              "list routes", "read clock",   "read log",   "download application"};
+  std::set<std::string> known{"check host",    "list objects", "list nodes",  // functions of their own
+                              "list routes",   "read clock",   "read log",   "download application",
+                              "list variables"};
   for (const auto& operation : Client::operations()) known.insert(operation.name);
   for (const Operation& operation : operations()) {
     if (operation.place == OperationPlace::internal) continue;

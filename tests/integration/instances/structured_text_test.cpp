@@ -1,4 +1,4 @@
-// The adapter for programs that MATIEC has translated, and, where that compiler is, the whole way from
+// The adapter for translated programs, and, where MATIEC or STruC++ is, the whole way from
 // Structured Text.
 #include <array>
 #include <chrono>
@@ -199,8 +199,14 @@ class StructuredText : public ::testing::Test {
     ASSERT_TRUE(fast);
     EXPECT_GT(fast->counters.cycles, 0U);
   }
-  ProgramEnd build(const std::string& text, const std::string& name = "twice") const {
-    return run_program({PLCCTL, "build", "application", sandbox.write(name + ".st", text), "-o", so(name)},
+  static bool has(const char* folder_of_compiler) {
+    const char* const folder = std::getenv(folder_of_compiler);  // NOLINT(concurrency-mt-unsafe)
+    return folder != nullptr && *folder != '\0';
+  }
+  ProgramEnd build(const std::string& text, const std::string& name = "twice",
+                   const std::string& compiler = "matiec") const {
+    return run_program({PLCCTL, "build", "application", sandbox.write(name + ".st", text), "-o", so(name),
+                        "--compiler", compiler},
                        sandbox.folder())
         .value();
   }
@@ -214,14 +220,34 @@ class StructuredText : public ::testing::Test {
   plc_image outputs_{};
 };
 
-/// Those that need the compiler.
-class TranslatedStructuredText : public StructuredText {
+class TranslatedByMatiec : public StructuredText {
  protected:
   void SetUp() override {
-    const char* const matiec = std::getenv("PLCHOST_MATIEC");  // NOLINT(concurrency-mt-unsafe)
-    if (matiec == nullptr || *matiec == '\0') GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+    if (!has("PLCHOST_MATIEC")) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
   }
 };
+
+class TranslatedByStrucpp : public StructuredText {
+ protected:
+  void SetUp() override {
+    if (!has("PLCHOST_STRUCPP")) GTEST_SKIP() << "needs STruC++ (PLCHOST_STRUCPP)";
+  }
+};
+
+/// By each of them.
+class TranslatedText : public StructuredText, public ::testing::WithParamInterface<std::string> {
+ protected:
+  void SetUp() override {
+    const bool is_matiec = GetParam() == "matiec";
+    if (!has(is_matiec ? "PLCHOST_MATIEC" : "PLCHOST_STRUCPP")) GTEST_SKIP() << "needs " << GetParam();
+  }
+  ProgramEnd build(const std::string& text, const std::string& name = "twice") const {
+    return StructuredText::build(text, name, GetParam());
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(By, TranslatedText, ::testing::Values("matiec", "strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
 
 TEST_F(StructuredText, ByTheAdapterHasItsTasksAndItsLocatedVariables) {
   start(application("located"));
@@ -242,7 +268,7 @@ TEST_F(StructuredText, ByTheAdapterHasExternalEventsAndTheOptionsOfItsTasks) {
   EXPECT_TRUE(eventually([&] { return outputs().posts == 4; })) << "the other tasks run on";
 }
 
-TEST_F(TranslatedStructuredText, ThatMatiecTranslatesRunsAsItIsWritten) {
+TEST_P(TranslatedText, RunsAsItIsWritten) {
   const ProgramEnd built = build(kTwice);
   ASSERT_TRUE(built.success()) << built.output;
   EXPECT_THAT(built.output, HasSubstr("twice.so: built"));
@@ -251,7 +277,7 @@ TEST_F(TranslatedStructuredText, ThatMatiecTranslatesRunsAsItIsWritten) {
   expect_it_works();
 }
 
-TEST_F(TranslatedStructuredText, ThatRetainsVariablesHasThemAfterARestart) {
+TEST_P(TranslatedText, ThatRetainsVariablesHasThemAfterARestart) {
   const ProgramEnd built = build(kCounting, "counting");
   ASSERT_TRUE(built.success()) << built.output;
   start(so("counting"));
@@ -273,7 +299,7 @@ TEST_F(TranslatedStructuredText, ThatRetainsVariablesHasThemAfterARestart) {
   EXPECT_EQ(cold.total, cold.fresh + 100);
 }
 
-TEST_F(TranslatedStructuredText, ThatIsInterruptedLosesNothingThatItWrote) {
+TEST_P(TranslatedText, ThatIsInterruptedLosesNothingThatItWrote) {
   const ProgramEnd built = build(kInterrupted, "interrupted");
   ASSERT_TRUE(built.success()) << built.output;
   EXPECT_THAT(built.output, HasSubstr("the tasks quick, idle use flag and can pre-empt each other"));
@@ -283,7 +309,7 @@ TEST_F(TranslatedStructuredText, ThatIsInterruptedLosesNothingThatItWrote) {
   EXPECT_GT(outputs<Interrupted>().fast, 300);
 }
 
-TEST_F(TranslatedStructuredText, ThatIsChangedOnlineGoesOnWithItsValues) {
+TEST_P(TranslatedText, ThatIsChangedOnlineGoesOnWithItsValues) {
   ASSERT_TRUE(build(kCounting, "counting").success());
   std::string text = kCounting;
   text.replace(text.find("total + 1;"), 10, "total + 1000;");
@@ -312,7 +338,7 @@ TEST_F(TranslatedStructuredText, ThatIsChangedOnlineGoesOnWithItsValues) {
   EXPECT_THAT(refused.text, HasSubstr("variables 'ONE.FRESH': qwLayout is"));
 }
 
-TEST_F(TranslatedStructuredText, HasTheTasksOfAFileBesideIt) {
+TEST_P(TranslatedText, HasTheTasksOfAFileBesideIt) {
   constexpr const char* kCounts = R"(
 PROGRAM Posted VAR posts AT %QB8 : USINT; END_VAR posts := posts + 1; END_PROGRAM
 PROGRAM Cyclic VAR twice AT %QW1 : INT; END_VAR twice := 7; END_PROGRAM
@@ -343,7 +369,7 @@ END_RESOURCE END_CONFIGURATION
               HasSubstr("twice.toml:3:1: task done late_policy: this task is not cyclic"));
 }
 
-TEST_F(TranslatedStructuredText, ThatIsNamedAsAHeaderOfCIsBuilt) {
+TEST_F(TranslatedByMatiec, ThatIsNamedAsAHeaderOfCIsBuilt) {
   std::string text = kCounting;
   text.replace(text.find("CONFIGURATION cell"), 18, "CONFIGURATION math");
   text.replace(text.find("RESOURCE press"), 14, "RESOURCE stdlib");
@@ -351,7 +377,7 @@ TEST_F(TranslatedStructuredText, ThatIsNamedAsAHeaderOfCIsBuilt) {
   EXPECT_TRUE(built.success()) << built.output;
 }
 
-TEST_F(TranslatedStructuredText, OfSeveralResourcesBecomesAllApplicationsOrNone) {
+TEST_F(TranslatedByMatiec, OfSeveralResourcesBecomesAllApplicationsOrNone) {
   std::string text = kCounting;
   const std::size_t resource = text.find("  RESOURCE press");
   const std::string one = text.substr(resource, text.find("END_CONFIGURATION") - resource);
@@ -369,7 +395,7 @@ TEST_F(TranslatedStructuredText, OfSeveralResourcesBecomesAllApplicationsOrNone)
   EXPECT_FALSE(std::filesystem::exists(press));
 }
 
-TEST_F(TranslatedStructuredText, ThatIsWrongIsToldInItsOwnWords) {
+TEST_F(TranslatedByMatiec, ThatIsWrongIsToldInItsOwnWords) {
   std::string text = kTwice;
   text.replace(text.find("raw * 2"), 7, "row * 2");
   const ProgramEnd built = build(text);
@@ -384,6 +410,31 @@ TEST_F(TranslatedStructuredText, ThatIsWrongIsToldInItsOwnWords) {
   EXPECT_THAT(build(text).output, HasSubstr("'P' is also a name in the library of iec2c"));
 }
 
+TEST_F(TranslatedByStrucpp, ThatStrucppRefusesIsToldInItsOwnWords) {
+  std::string text = kTwice;
+  text.replace(text.find("raw * 2"), 7, "row * 2");
+  const ProgramEnd built = build(text, "twice", "strucpp");
+  EXPECT_EQ(built.exit_code, 1);
+  EXPECT_THAT(built.output, HasSubstr("twice.st:14:12: "));
+  text = kTwice;
+  text.replace(text.find(": Loop;"), 7, ": Loop (loops := 5);");
+  EXPECT_THAT(build(text, "twice", "strucpp").output,
+              HasSubstr("twice.st:35:5: PROGRAM rest: STruC++ cannot translate connections"));
+  text = kTwice;
+  text.replace(text.find("    TASK fast"), 0, "    VAR_GLOBAL own : INT; END_VAR\n");
+  EXPECT_THAT(build(text, "twice", "strucpp").output,
+              HasSubstr("own: STruC++ knows no VAR_GLOBAL in a RESOURCE"));
+}
+
+TEST_F(TranslatedByStrucpp, ThatReadsBeyondAnArrayStopsByAnException) {
+  std::string text = kCounting;
+  text.replace(text.find("of_shift[1] := "), 15, "of_shift[REAL_TO_INT(3.0)] := ");
+  const ProgramEnd built = build(text, "beyond", "strucpp");
+  ASSERT_TRUE(built.success()) << built.output;
+  start(so("beyond"));
+  EXPECT_TRUE(eventually([&] { return sut->task("fast")->state == PageTaskState::exception; }));
+}
+
 TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
   const ProgramEnd built = run_program({PLCCTL, "build", "application", sandbox.write("twice.st", kTwice),
                                         "-o", sandbox.folder() + "/twice.so", "--matiec", sandbox.folder()},
@@ -391,6 +442,19 @@ TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
                                .value();
   EXPECT_EQ(built.exit_code, 1);
   EXPECT_THAT(built.output, HasSubstr("there is no iec2c with its lib folder in"));
+}
+
+TEST_F(StructuredText, IsTranslatedByTheCompilerThatIsNamed) {
+  const std::string source = sandbox.write("twice.st", kTwice);
+  const auto said = [&](std::vector<std::string> options) {
+    std::vector<std::string> command{PLCCTL, "build", "application", source, "-o", so("twice")};
+    command.insert(command.end(), options.begin(), options.end());
+    return run_program(command, sandbox.folder()).value().output;
+  };
+  EXPECT_THAT(said({"--compiler", "strucpp", "--strucpp", sandbox.folder()}),
+              HasSubstr("there is no built STruC++"));
+  EXPECT_THAT(said({"--compiler", "matiec", "--matiec", sandbox.folder()}), HasSubstr("there is no iec2c"));
+  EXPECT_THAT(said({"--compiler", "other"}), HasSubstr("--compiler other: allowed are matiec and strucpp"));
 }
 
 }  // namespace

@@ -40,6 +40,7 @@ Plant::~Plant() {
   for (const std::string& name : names_) {
     InstancePage::remove(pool_, name);
     TransitionRing::remove(pool_, name);
+    MemoryFile::remove(pool_ + ".variables." + name);
     LogRing::remove(pool_, name);
     MemoryFile::remove(pool_ + ".wish." + name);
   }

@@ -9,10 +9,11 @@ log=$cell/configure.log
 configured() { rm -rf "$cell/build" && cmake -S "$source" -B "$cell/build" "$@" >"$log" 2>&1; }
 says() { tr -s '\n ' ' ' <"$log" | grep -qF -- "$1" || fail "it does not say: $1"; }
 hidden() { printf -- '-DCMAKE_DISABLE_FIND_PACKAGE_%s=ON\n' "$@"; }
-mapfile -t all < <(hidden help2man Python pybind11 GTest FastDDS iceoryx_posh)
+mapfile -t all < <(hidden help2man libmodbus Python pybind11 GTest FastDDS iceoryx_posh)
 
 echo "- nothing but the packages of the build"
 configured "${all[@]}" || fail "not configured"
+says "Without plchost-modbus: libmodbus is not installed"
 says "Without the manual pages of plchostd, plchost-dds and plc-instance: help2man is not installed"
 says "Without the module for Python: Python/Interpreter/Development.Module is not installed"
 says "Without the tests: GTest::gmock is not installed"
@@ -43,6 +44,7 @@ refused() {
   ! configured "${packages[@]}" "-D$option=ON" || fail "$option=ON without $*"
   says "$message"
 }
+refused PLCHOST_MODBUS "libmodbus is not installed: plchost-modbus cannot be built" libmodbus
 refused PLCHOST_MANUALS "help2man is not installed: the manual pages" help2man
 refused PLCHOST_PYTHON "pybind11 2.10 is not installed: the module for Python" pybind11
 refused PLCHOST_TESTS "GTest::gmock is not installed: the tests cannot be built" GTest

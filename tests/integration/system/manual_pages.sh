@@ -2,7 +2,7 @@
 # Each program has a manual page that man(1) finds, and it has each option that --help has. The table of the commands in
 # api/plcctl.md is that of plcctl.
 . "$(dirname "$0")/common.sh"
-for program in plcctl plchostd plchost-dds plc-instance; do
+for program in plcctl plchostd plchost-dds plc-instance plchost-modbus; do
   page=$(find "$BIN/../share/man" -name "$program.[18]")
   [ -n "$page" ] || fail "no manual page of $program"
   grep -q '^\.SH NAME' "$page" || fail "$page has no NAME"

@@ -11,6 +11,7 @@
 namespace plchost::matiec {
 namespace {
 
+using iec::Glue;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;

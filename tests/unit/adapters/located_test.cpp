@@ -2,9 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include "instances/adapters/iec/place.hpp"
+
 namespace plchost::matiec {
 namespace {
 
+using iec::Place;
+using iec::place_of;
 using testing::HasSubstr;
 using testing::SizeIs;
 

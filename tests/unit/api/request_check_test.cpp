@@ -31,6 +31,27 @@ Result<ControlRequest> check(const plc_Request& request, ApiRole role) {
   return check_request(request, role, "hosta", kInstances);
 }
 
+TEST(RequestCheck, TakesTheNameAndTheValueOfAVariable) {
+  const auto engineering = [](std::int32_t operation, std::string_view argument) {
+    return check(make(operation, "line1", argument), ApiRole::engineering);
+  };
+  for (const auto operation : {plc_OPERATION_WRITE_VARIABLE, plc_OPERATION_FORCE_VARIABLE}) {
+    EXPECT_EQ(engineering(operation, "Line.speed=5")->argument, "Line.speed=5");
+    EXPECT_EQ(engineering(operation, "Line.text='a=b'")->argument, "Line.text='a=b'");
+    EXPECT_EQ(engineering(operation, "Line.text=")->argument, "Line.text=");
+    for (const char* const wrong : {"", "=5", "Line.speed", "Line.speed=\x1b[2J"}) {
+      const auto refused = engineering(operation, wrong);
+      ASSERT_FALSE(refused) << wrong;
+      EXPECT_THAT(refused.error().message, HasSubstr("is not of the form NAME=VALUE"));
+    }
+    EXPECT_FALSE(check(make(operation, "line1", "Line.speed=5"), ApiRole::operating)) << "for engineers";
+  }
+  EXPECT_EQ(engineering(plc_OPERATION_UNFORCE_VARIABLE, "*")->argument, "*");
+  EXPECT_EQ(engineering(plc_OPERATION_UNFORCE_VARIABLE, "Grid[1,2]")->argument, "Grid[1,2]");
+  EXPECT_FALSE(engineering(plc_OPERATION_UNFORCE_VARIABLE, ""));
+  EXPECT_FALSE(engineering(plc_OPERATION_UNFORCE_VARIABLE, "a=5"));
+}
+
 TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_START), ApiRole::operating)->verb, ControlVerb::start);
   EXPECT_EQ(check(make(plc_OPERATION_STOP), ApiRole::operating)->verb, ControlVerb::stop);
@@ -52,6 +73,7 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_LIST_ROUTES, ""), ApiRole::operating)->verb, ControlVerb::list_routes);
   EXPECT_EQ(check(make(plc_OPERATION_READ_LOG), ApiRole::operating)->verb, ControlVerb::read_log);
   EXPECT_FALSE(check(make(plc_OPERATION_READ_LOG, ""), ApiRole::operating)) << "of one instance";
+  EXPECT_EQ(check(make(plc_OPERATION_LIST_VARIABLES), ApiRole::operating)->verb, ControlVerb::list_variables);
   for (const char* task : {"", "Main"}) {
     const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
     EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);

@@ -131,7 +131,8 @@ TEST(StatusRows, OfAHostHaveWhatItsStatusSaysAndWhatIsKnownBesideIt) {
       json_text(row),
       R"({"host":"hosta","state":"alive","version":"","started_unix_s":2,"running":0,"instances":3,)"
       R"("tasks":0,"events":0,"objects":0,"load":1.5,"cores":null,"memory_mib":null,)"
-      R"("available_mib":null,"clock_offset_us":2.0,"clock_uncertainty_us":0.5,"secured":false,)"
+      R"("available_mib":null,"clock_offset_us":2.0,"clock_uncertainty_us":0.5,"grid_reference":null,)"
+      R"("grid_offset_us":null,"grid_in_sync":null,"secured":false,)"
       R"("manager_pid":0,"server_pid":11,"problem":"","labels":"hall=2","schedulers":"","audit_number":0,)"
       R"("audit_hash":"","unrecorded":"","rival":"","unsaved":""})");
   host.silent = true;
@@ -143,6 +144,23 @@ TEST(StatusRows, OfAHostHaveWhatItsStatusSaysAndWhatIsKnownBesideIt) {
   EXPECT_TRUE(row.at("load").is_null());
   EXPECT_TRUE(row.at("clock_offset_us").is_null());
   EXPECT_EQ(row.at("problem"), "another host wants this name and is refused: hostb");
+}
+
+TEST(StatusRows, OfAHostTellHowFarItsCyclesAreFromTheClockThatTheyFollow) {
+  HostView host{.name = "hosta", .epoch = 1, .server_pid = 11, .status = {}, .ext = {}};
+  host.status.grid_instances = 2;
+  host.status.grid_in_sync = 1;
+  host.status.grid_offset_ns = -1'300;
+  dds::copy_text(host.status.grid_reference, "ptp:/dev/ptp0");
+  Row row = to_row(host, std::nullopt);
+  EXPECT_EQ(row.at("grid_reference"), "ptp:/dev/ptp0");
+  EXPECT_EQ(row.at("grid_offset_us"), -1.3);
+  EXPECT_EQ(row.at("grid_in_sync"), false);
+  host.status.grid_in_sync = 2;
+  host.status.grid_offset_ns = 0;
+  row = to_row(host, std::nullopt);
+  EXPECT_EQ(row.at("grid_offset_us"), 0.0);
+  EXPECT_EQ(row.at("grid_in_sync"), true);
 }
 
 TEST(StatusRows, ShowWhatTheirExtensionHas) {

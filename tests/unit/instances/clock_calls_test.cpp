@@ -6,7 +6,7 @@
 
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
-#include "instances/runtime/time/reference_memory.hpp"
+#include "instances/runtime/time/reference.hpp"
 #include "tests/support/manual_clock.hpp"
 #include "tests/support/simulated_reference.hpp"
 

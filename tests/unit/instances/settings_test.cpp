@@ -16,6 +16,7 @@ namespace plchost {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -75,7 +76,8 @@ TEST(Settings, ReadsTheDistributedClock) {
                                           .hold_over_limit = 0ms};
   EXPECT_EQ(sut->scheduler.distributed_clock, expected);
   EXPECT_THAT(complaint("[DistributedClock]\nReference=a/b\n"),
-              HasSubstr("line1.cfg:2: [DistributedClock] Reference"));
+              AllOf(HasSubstr("line1.cfg:2: [DistributedClock] Reference"),
+                    HasSubstr("realtime, tai, ptp:/dev/NAME, or the name of a shared memory")));
   EXPECT_THAT(complaint("[DistributedClock]\nKpPpm=0\n"), HasSubstr("1 to 1000000"));
   EXPECT_THAT(complaint("[DistributedClock]\nSyncWindow=1\n"), HasSubstr("did you mean 'SyncWindowNs'?"));
 }

@@ -13,6 +13,8 @@ const any_function every_call[] = {
     (any_function)plc_declare_area,
     (any_function)plc_area_address,
     (any_function)plc_get_area_state,
+    (any_function)plc_declare_variable,
+    (any_function)plc_apply_forces,
     (any_function)plc_keep_variables,
     (any_function)plc_online_change,
     (any_function)SchedRegisterExternalEvent,

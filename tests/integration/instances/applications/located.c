@@ -3,7 +3,7 @@
  * without a compiler for Structured Text. kTwice in structured_text_test.cpp is the same program, but for the
  * tasks of external events.
  */
-#include "plchost_matiec.h"
+#include "plchost_adapter.h"
 
 typedef unsigned char boolean;
 static boolean go, lamp, flag, edges, copy, loops, posts, preset = 9;
@@ -75,5 +75,7 @@ const struct plchost_task plchost_tasks[] = {
 void plchost_each_variable(void (*use)(const struct plchost_variable*)) {
   (void)use;
 }
+void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {
+  (void)use;
+}
 void plchost_bind(void) {}
-void config_init__(void) {}

@@ -1,0 +1,142 @@
+#include "api/cli/verbs/variable_recording.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/cli/interrupt.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct RecordArguments {
+  std::string instance;
+  std::vector<std::string> names;
+  double interval_s = 0.1;
+  double duration_s = 0;  // 0: until Ctrl-C
+  std::string file;       // empty: the standard output
+};
+
+/// As RFC 4180 has it.
+std::string csv_cell(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+  std::string cell = "\"";
+  for (const char c : text) cell.append(c == '"' ? 2 : 1, c);
+  return cell + "\"";
+}
+
+/// Writes samples as CSV: a line with the names, then one for each sample.
+class Recording {
+ public:
+  explicit Recording(std::FILE* file) noexcept : file_(file) {}
+
+  /// wrong_state: the application has other variables by now. system: the file takes no more.
+  Result<void> add(const VariableListing& sample) {
+    std::string names = "time,time_unix_ns,consistent";
+    std::string line =
+        fmt::format("{},{},{}", time_text(sample.time_unix_ns), sample.time_unix_ns, sample.consistent);
+    for (const plc_VariableRecord& variable : sample.variables) {
+      names += "," + csv_cell(dds::text_of(variable.name));
+      line += "," + csv_cell(dds::text_of(variable.value));
+    }
+    if (names_.empty()) {
+      fmt::print(file_, "{}\n", names);
+      names_ = std::move(names);
+    } else if (names != names_) {
+      return failure(ErrorCode::wrong_state,
+                     "the application has other variables than when the recording began");
+    }
+    fmt::print(file_, "{}\n", line);
+    ++samples_;
+    if (std::fflush(file_) != 0 || std::ferror(file_) != 0)
+      return failure(ErrorCode::system, "cannot write the recording", errno);
+    return {};
+  }
+  [[nodiscard]] std::uint64_t samples() const noexcept { return samples_; }
+
+ private:
+  std::FILE* file_;
+  std::string names_;
+  std::uint64_t samples_ = 0;
+};
+
+struct CloseFile {
+  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+};
+
+int record(CliSession& session, const RecordArguments& arguments) {
+  catch_interrupts();
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  VariableSampler sampler(session, *host, arguments.instance,
+                          {.patterns = arguments.names, .forced = false, .after = 0});
+  std::unique_ptr<std::FILE, CloseFile> file;
+  if (!arguments.file.empty()) {
+    file.reset(std::fopen(arguments.file.c_str(), "we"));
+    if (!file) return CliSession::fail({ErrorCode::system, errno, "cannot write " + arguments.file});
+  }
+  Recording recording(file ? file.get() : stdout);
+  const TimePoint begin = MonotonicClock::now();
+  const auto length =
+      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.duration_s));
+  Result<void> written;
+  const int code =
+      sample_again_and_again(sampler, SampleTimes(arguments.interval_s), [&](const VariableListing& sample) {
+        written = recording.add(sample);
+        return written && (arguments.duration_s <= 0 || MonotonicClock::now() - begin < length);
+      });
+  if (!written) return CliSession::fail(written.error());
+  if (file && code == kExitDone)
+    session.say(fmt::format("{} samples in {}", recording.samples(), arguments.file));
+  return code;
+}
+
+}  // namespace
+
+TimePoint SampleTimes::after(TimePoint planned, TimePoint now) const noexcept {
+  const TimePoint next = planned + interval_;
+  return next > now ? next : planned + ((now - planned) / interval_ + 1) * interval_;
+}
+
+int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times,
+                           const std::function<bool(const VariableListing&)>& use) {
+  bool silent = false;
+  bool first = true;
+  for (TimePoint next = MonotonicClock::now(); !interrupted();) {
+    const auto sample = sampler.sample();
+    if (sample) {
+      silent = false;
+      if (!use(*sample)) break;
+    } else if (first || !comes_back(sample.error())) {
+      return CliSession::fail(sample.error());
+    } else if (!std::exchange(silent, true)) {
+      (void)CliSession::fail(sample.error());
+    }
+    first = false;
+    next = times.after(next, MonotonicClock::now());
+    sleep_until_interrupted(next);
+  }
+  return kExitDone;
+}
+
+void add_record_variables(const Command& plcctl, CliSession& session) {
+  const auto arguments = std::make_shared<RecordArguments>();
+  plcctl.verb("record", "Write samples of variables into a file")
+      .noun("variables", "Samples of variables as CSV, each of one moment in which no task is within a cycle",
+            [&session, arguments] { return record(session, *arguments); })
+      .argument("INSTANCE", arguments->instance)
+      .arguments("VARIABLE", arguments->names, kVariableNames)
+      .option("--interval", arguments->interval_s, "seconds between two samples (default 0.1)",
+              kMinSampleInterval, kMaxSampleInterval)
+      .option("--duration", arguments->duration_s, "seconds; 0: until Ctrl-C (default 0)", 0.0, 1e9)
+      .optional("--file", arguments->file, "the file; without it: the standard output");
+}
+
+}  // namespace plchost

@@ -1,0 +1,31 @@
+#include "api/cli/verbs/variable_sampler.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include <fmt/format.h>
+
+#include "api/dds/page_sample.hpp"
+
+namespace plchost {
+
+Result<std::vector<plc_VariableRecord>> VariableSampler::all() {
+  std::vector<plc_VariableRecord> variables;
+  VariableQuery query = query_;
+  for (bool goes_on = true; goes_on;) {
+    PLCHOST_TRY_ASSIGN(
+        auto page, session_.client().value()->list_variables(host_, instance_, query, session_.deadline()));
+    PLCHOST_TRY_ASSIGN(goes_on, next_page(host_, page, query));
+    std::ranges::move(page.variables, std::back_inserter(variables));
+  }
+  return variables;
+}
+
+Result<VariableListing> VariableSampler::sample() {
+  PLCHOST_TRY_ASSIGN(
+      auto page, session_.client().value()->list_variables(host_, instance_, query_, session_.deadline()));
+  PLCHOST_TRY(is_whole(page));
+  return page;
+}
+
+}  // namespace plchost

@@ -1,0 +1,102 @@
+/*
+ * An application for plchost of what a compiler has made of a program. The runtime sees only plc_app.h.
+ */
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "plc_app.h"
+#include "plc_variables.h"
+#include "plchost_adapter.h"
+
+PLC_EXPORT_ABI;
+
+static Task_Info* infos;
+
+/* The clock of IEC's timers: that of the cycle's begin, for each task its own. */
+static struct timespec* now;
+struct timespec* plchost_now(void); /* which the library of a compiler declares in its own way */
+struct timespec* plchost_now(void) {
+  const Task_Info* const current = plc_current_task();
+  return &now[current == NULL ? 0 : current - infos];
+}
+
+void plchost_begin(unsigned int number) {
+  clock_gettime(CLOCK_MONOTONIC, &now[number]);
+  plchost_take_places(&plchost_tasks[number]);
+  plc_apply_forces();
+}
+
+void plchost_end(unsigned int number) {
+  plc_apply_forces();
+  plchost_put_places(&plchost_tasks[number]);
+  plchost_keep_retained(&plchost_tasks[number]);
+}
+
+static void fill(Task_Info* info, const struct plchost_task* task) {
+  strncpy(info->stName, task->name, sizeof info->stName - 1);
+  info->nPriority = task->priority;
+  info->dwTaskEntryFunctionPointer = task->run;
+  if (task->external_event != NULL) {
+    info->KindOfTask = External;
+    strncpy(info->stExternalEvent, task->external_event, sizeof info->stExternalEvent - 1);
+  } else if (task->edge != NULL) {
+    info->KindOfTask = Event;
+    info->dwEventFunctionPointer = task->edge;
+  } else if (task->interval_ns == 0) {
+    info->KindOfTask = Freewheeling;
+  } else {
+    info->KindOfTask = Cyclic;
+    info->bMicroseconds = task->interval_ns % 1000000 != 0;
+    info->dwInterval = (unsigned int)(task->interval_ns / (info->bMicroseconds ? 1000 : 1000000));
+  }
+}
+
+/* The log says what the runtime refuses. */
+static int set_options(const struct plchost_task* task) {
+  const struct plchost_options* const given = task->options;
+  Task_Options options;
+  if (given == NULL) return 1;
+  memset(&options, 0, sizeof options);
+  options.dwSize = sizeof options;
+  options.nStartOffsetNs = given->start_offset_ns;
+  options.nLatePolicy = given->late_policy;
+  options.bDrivesOutputs = given->drives_outputs;
+  options.dwWatchdogTimeUs = given->watchdog_time_us;
+  options.dwWatchdogSensitivity = given->watchdog_sensitivity;
+  options.dwWatchdogOmittedCycles = given->watchdog_omitted_cycles;
+  options.nWatchdogPolicy = given->watchdog_policy;
+  return plc_set_task_options(task->name, &options) == ERR_OK;
+}
+
+/* Several tasks may wait for one event. */
+static int register_event(const struct plchost_task* task) {
+  return task->external_event == NULL ||
+         SchedRegisterExternalEvent(task->external_event, NULL) != RTS_INVALID_HANDLE;
+}
+
+int CDECL plc_app_init(void) {
+  static sys_setup_tasks_struct setup;
+  unsigned int i;
+  infos = calloc(plchost_task_count, sizeof *infos);
+  now = calloc(plchost_task_count, sizeof *now);
+  if (infos == NULL || now == NULL) return 1;
+  plchost_bind();
+  if (!plchost_declare_places() || !plchost_declare_variables() || !plchost_declare_symbols()) return 1;
+  for (i = 0; i < plchost_task_count; ++i) fill(&infos[i], &plchost_tasks[i]);
+  setup.nTasks = (short)plchost_task_count;
+  strncpy(setup.stApplicationName, plchost_application_name, sizeof setup.stApplicationName - 1);
+  setup.ptaskinfo = infos;
+  __sys__setup__tasks(&setup);
+  for (i = 0; i < plchost_task_count; ++i) {
+    if (!set_options(&plchost_tasks[i]) || !register_event(&plchost_tasks[i])) return 1;
+  }
+  return 0;
+}
+
+void CDECL plc_app_exit(void) {
+  plchost_forget_places();
+  plchost_forget_variables();
+  free(infos);
+  free(now);
+}

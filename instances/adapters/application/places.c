@@ -1,0 +1,273 @@
+/*
+ * Located variables and their areas. A variable has one value. All tasks share it as they share globals.
+ *
+ * Inputs: a task takes them from its copy of the area at the begin of its cycle. A variable of a program has
+ * a value for each task.
+ *
+ * Outputs: the value is the truth. A task puts its places out at the end of its cycle. With them it puts the
+ * other bits of their bytes, as the tasks that use those have put them last. Places that share bits are taken
+ * at the begin, and put out if they changed.
+ *
+ * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last. It is
+ * put out if the program's value does. So neither a task that interrupts this one nor firmware is undone.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "plc_app.h"
+#include "plchost_adapter.h"
+
+struct area {
+  char letter;
+  const char* name;
+  unsigned int flags;
+  unsigned int bytes;
+  unsigned char* initial;
+  Plc_Area_Use* users;
+  RTS_HANDLE handle;
+};
+static struct area areas[] = {{'I', "inputs", PLC_AREA_INPUT, 0, NULL, NULL, NULL},
+                              {'Q', "outputs", PLC_AREA_OUTPUT, 0, NULL, NULL, NULL},
+                              {'M', "memory", PLC_AREA_MEMORY, 0, NULL, NULL, NULL}};
+#define AREAS (sizeof areas / sizeof areas[0])
+
+static struct area* area_of(const struct plchost_place* place) {
+  unsigned int i = 0;
+  while (areas[i].letter != place->area) ++i;
+  return &areas[i];
+}
+
+/* Values lie at multiples of their size, places do not. */
+static unsigned long long value_at(const void* value, unsigned int bytes) {
+  switch (bytes) {
+    case 1:
+      return __atomic_load_n((const unsigned char*)value, __ATOMIC_RELAXED);
+    case 2:
+      return __atomic_load_n((const unsigned short*)value, __ATOMIC_RELAXED);
+    case 4:
+      return __atomic_load_n((const unsigned int*)value, __ATOMIC_RELAXED);
+    default:
+      return __atomic_load_n((const unsigned long long*)value, __ATOMIC_RELAXED);
+  }
+}
+static unsigned long long value_of(const struct plchost_place* place, const void* value) {
+  const unsigned long long now = value_at(value, place->bytes);
+  return place->bit < 0 ? now : now != 0;
+}
+static void set_value(void* value, unsigned int bytes, unsigned long long now) {
+  switch (bytes) {
+    case 1:
+      __atomic_store_n((unsigned char*)value, (unsigned char)now, __ATOMIC_RELAXED);
+      break;
+    case 2:
+      __atomic_store_n((unsigned short*)value, (unsigned short)now, __ATOMIC_RELAXED);
+      break;
+    case 4:
+      __atomic_store_n((unsigned int*)value, (unsigned int)now, __ATOMIC_RELAXED);
+      break;
+    default:
+      __atomic_store_n((unsigned long long*)value, now, __ATOMIC_RELAXED);
+  }
+}
+/* Unless another task has changed it meanwhile: then 0. */
+#define SET_IF(type)                                                                            \
+  {                                                                                             \
+    type expected = (type)before;                                                               \
+    return __atomic_compare_exchange_n((type*)value, &expected, (type)now, 0, __ATOMIC_SEQ_CST, \
+                                       __ATOMIC_SEQ_CST);                                       \
+  }
+static int set_value_if(void* value, unsigned int bytes, unsigned long long before, unsigned long long now) {
+  switch (bytes) {
+    case 1:
+      SET_IF(unsigned char)
+    case 2:
+      SET_IF(unsigned short)
+    case 4:
+      SET_IF(unsigned int)
+    default:
+      SET_IF(unsigned long long)
+  }
+}
+
+static unsigned long long load(const struct plchost_place* place, const unsigned char* area) {
+  unsigned long long value = 0;
+  memcpy(&value, area + place->offset, place->bytes);
+  return place->bit < 0 ? value : (value >> place->bit) & 1u;
+}
+
+/* Several tasks may have bits in one byte of the memory area. */
+static void store(const struct plchost_place* place, unsigned char* area, unsigned long long value) {
+  unsigned char* const byte = area + place->offset;
+  if (place->bit < 0) {
+    memcpy(byte, &value, place->bytes);
+  } else if (value != 0) {
+    __atomic_fetch_or(byte, (unsigned char)(1u << place->bit), __ATOMIC_RELAXED);
+  } else {
+    __atomic_fetch_and(byte, (unsigned char)~(1u << place->bit), __ATOMIC_RELAXED);
+  }
+}
+
+/* Where they are for the task whose cycle runs on this thread. */
+static void find_areas(unsigned char* found[AREAS]) {
+  unsigned int i;
+  for (i = 0; i < AREAS; ++i) found[i] = areas[i].bytes == 0 ? NULL : plc_area_address(areas[i].handle);
+}
+
+static void take_memory(unsigned int number, const unsigned char* area) {
+  const struct plchost_place* const place = &plchost_places[number];
+  unsigned long long* const exchanged = &plchost_exchanged[number];
+  const unsigned long long last = __atomic_load_n(exchanged, __ATOMIC_SEQ_CST);
+  const unsigned long long before = value_at(place->value, place->bytes);
+  const unsigned long long now = load(place, area);
+  if (now != last && set_value_if(place->value, place->bytes, before, now))
+    __atomic_store_n(exchanged, now, __ATOMIC_SEQ_CST);
+}
+
+/* First into the area: a task that comes between the two takes what is there already. */
+static void put_memory(unsigned int number, unsigned char* area) {
+  const struct plchost_place* const place = &plchost_places[number];
+  unsigned long long* const exchanged = &plchost_exchanged[number];
+  const unsigned long long value = value_of(place, place->value);
+  if (value == __atomic_load_n(exchanged, __ATOMIC_SEQ_CST)) return;
+  store(place, area, value);
+  __atomic_store_n(exchanged, value, __ATOMIC_SEQ_CST);
+}
+
+/* Of another version, whose values this one has: then they are those that were put last. */
+static void find_put(void) {
+  unsigned int i;
+  for (i = 0; i < plchost_place_count; ++i) {
+    const struct plchost_place* const place = &plchost_places[i];
+    if (place->area == 'Q') plchost_exchanged[i] = value_of(place, place->value);
+  }
+}
+
+static void put_output(const struct plchost_use* use, unsigned char* area) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  unsigned long long* const exchanged = &plchost_exchanged[use->place];
+  const unsigned long long value = value_of(place, use->value);
+  if (use->others) {
+    store(place, area, __atomic_load_n(exchanged, __ATOMIC_SEQ_CST));
+  } else if (!place->aliased || value != use->before) {
+    __atomic_store_n(exchanged, value, __ATOMIC_SEQ_CST);
+    store(place, area, value);
+  }
+}
+
+void plchost_take_places(const struct plchost_task* task) {
+  static int is_known = 0;
+  unsigned char* found[AREAS];
+  unsigned int i;
+  if (!__atomic_load_n(&is_known, __ATOMIC_SEQ_CST)) {
+    find_put();
+    __atomic_store_n(&is_known, 1, __ATOMIC_SEQ_CST);
+  }
+  find_areas(found);
+  for (i = 0; i < task->uses_count; ++i) {
+    struct plchost_use* const use = &task->uses[i];
+    const struct plchost_place* const place = &plchost_places[use->place];
+    const unsigned char* const area = found[area_of(place) - areas];
+    if (place->area == 'M') {
+      take_memory(use->place, area);
+    } else if (place->area == 'I' || place->aliased) {
+      use->before = load(place, area);
+      set_value(use->value, place->bytes, use->before);
+    }
+  }
+}
+
+void plchost_put_places(const struct plchost_task* task) {
+  unsigned char* found[AREAS];
+  unsigned int i;
+  find_areas(found);
+  for (i = 0; i < task->uses_count; ++i) {
+    const struct plchost_use* const use = &task->uses[i];
+    const struct plchost_place* const place = &plchost_places[use->place];
+    unsigned char* const area = found[area_of(place) - areas];
+    if (place->area == 'M') {
+      put_memory(use->place, area);
+    } else if (place->area == 'Q') {
+      put_output(use, area);
+    }
+  }
+}
+
+unsigned char plchost_bit_now(unsigned int number) {
+  const struct plchost_place* const place = &plchost_places[number];
+  const unsigned char* const area = plc_area_address(area_of(place)->handle);
+  return area == NULL ? 0 : (unsigned char)load(place, area);
+}
+
+static int uses(const struct plchost_task* task, const struct area* area) {
+  unsigned int i;
+  for (i = 0; i < task->uses_count; ++i) {
+    if (area_of(&plchost_places[task->uses[i].place]) == area) return 1;
+  }
+  return 0;
+}
+
+/* Places may share bytes, and a bit that is set in one of them is set. */
+static void preset(const struct area* area) {
+  unsigned int i;
+  unsigned int j;
+  for (i = 0; i < plchost_place_count; ++i) {
+    const struct plchost_place* const place = &plchost_places[i];
+    const unsigned long long value = value_of(place, place->value);
+    if (place->area != area->letter) continue;
+    if (place->bit >= 0) {
+      area->initial[place->offset] |= (unsigned char)(value << place->bit);
+      continue;
+    }
+    for (j = 0; j < place->bytes; ++j) area->initial[place->offset + j] |= (unsigned char)(value >> (8 * j));
+  }
+}
+
+static int declare(struct area* area) {
+  unsigned int i;
+  Plc_Area declared;
+  for (i = 0; i < plchost_place_count; ++i) {
+    const struct plchost_place* const place = &plchost_places[i];
+    const unsigned int end = place->offset + place->bytes;
+    if (place->area == area->letter && end > area->bytes) area->bytes = end;
+  }
+  if (area->bytes == 0) return 1;
+  area->initial = calloc(area->bytes, 1);
+  area->users = calloc(plchost_task_count, sizeof *area->users);
+  if (area->initial == NULL || area->users == NULL) return 0;
+  preset(area);
+  memset(&declared, 0, sizeof declared);
+  declared.dwSize = sizeof declared;
+  declared.dwFlags = area->flags;
+  declared.pszName = area->name;
+  declared.dwBytes = area->bytes;
+  declared.pInitial = area->initial;
+  for (i = 0; i < plchost_task_count; ++i) {
+    if (uses(&plchost_tasks[i], area)) area->users[declared.nUses++].pszTask = plchost_tasks[i].name;
+  }
+  /* A variable that no program names has an area of all tasks. */
+  declared.pUses = area->users;
+  area->handle = plc_declare_area(&declared, NULL);
+  return area->handle != RTS_INVALID_HANDLE;
+}
+
+int plchost_declare_places(void) {
+  unsigned int i;
+  for (i = 0; i < plchost_place_count; ++i) {
+    const struct plchost_place* const place = &plchost_places[i];
+    plchost_exchanged[i] = value_of(place, place->value);
+    /* An output is what the program has; an edge is one of a value of before. */
+    if (plc_keep_variables(place->name, place->value, place->bytes, 0) != ERR_OK) return 0;
+  }
+  for (i = 0; i < AREAS; ++i) {
+    if (!declare(&areas[i])) return 0;
+  }
+  return 1;
+}
+
+void plchost_forget_places(void) {
+  unsigned int i;
+  for (i = 0; i < AREAS; ++i) {
+    free(areas[i].initial);
+    free(areas[i].users);
+  }
+}

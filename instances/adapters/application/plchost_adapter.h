@@ -1,0 +1,119 @@
+/*
+ * Between the files of an application that a compiler for IEC 61131-3 has translated: the one that `plcctl
+ * build application` writes, in C or C++, in which the program and its types are, and those that know the
+ * runtime: application.c, places.c, symbols.c and variables.c. All names are in lower case: those of the
+ * program are in upper case, so none of them can be the same.
+ */
+#ifndef PLCHOST_ADAPTER_H
+#define PLCHOST_ADAPTER_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A located variable. Its value lies where the program has it, its bytes or its bit lie in an area. */
+struct plchost_place {
+  const char* name;
+  char area;             /* 'I', 'Q' or 'M' */
+  unsigned char bytes;   /* 1, 2, 4 or 8 */
+  signed char bit;       /* 0 to 7; -1: whole bytes */
+  unsigned char aliased; /* 1: another place has some of the same bits */
+  unsigned int offset;   /* of the first byte in the area */
+  void* value;
+};
+
+/* A place that a task exchanges with its area. */
+struct plchost_use {
+  unsigned int place;
+  void* value;          /* that of the place, or one of this task alone */
+  unsigned char others; /* 1: only other tasks use it. It has bits in a byte that this one puts out */
+  unsigned long long before;
+};
+
+/* Options that IEC 61131-3 does not have; the ranges are those of Task_Options in plc_app.h. */
+struct plchost_options {
+  long start_offset_ns;
+  short late_policy; /* PLC_LATE_... */
+  unsigned char drives_outputs;
+  unsigned int watchdog_time_us;
+  unsigned int watchdog_sensitivity;
+  unsigned int watchdog_omitted_cycles;
+  short watchdog_policy; /* PLC_WATCHDOG_... */
+};
+
+struct plchost_task {
+  const char* name;
+  short priority;
+  long interval_ns;            /* 0: not cyclic */
+  unsigned char (*edge)(void); /* of SINGLE; null: it has none */
+  void (*run)(void);
+  unsigned int uses_count;
+  struct plchost_use* uses;
+  unsigned int retained_count;
+  const unsigned int* retained;          /* numbers among the retained variables */
+  const char* external_event;            /* each post runs it; null: none does */
+  const struct plchost_options* options; /* null: the defaults */
+};
+
+/* A variable that is not located. */
+struct plchost_variable {
+  const char* path;
+  void* value;
+  unsigned int bytes;
+  unsigned long long layout; /* another one if its type is another one */
+  int retain;
+};
+
+/* A variable that can be seen from outside, as in plc_variables.h. */
+struct plchost_symbol {
+  const char* name;
+  unsigned int type; /* PLC_TYPE_... */
+  void* value;
+  unsigned int bytes; /* of one element */
+  unsigned int read_only;
+  unsigned int dimensions;
+  struct {
+    int first;
+    unsigned int count;
+    unsigned int stride;
+  } dimension[3];
+  const char* task; /* null: several */
+  const char* area; /* null: it is not located */
+};
+
+/* From the file that plcctl writes. */
+extern const char plchost_application_name[];
+extern const unsigned int plchost_task_count;
+extern const struct plchost_task plchost_tasks[];
+extern const unsigned int plchost_place_count;
+extern const struct plchost_place plchost_places[];
+extern unsigned long long plchost_exchanged[]; /* for each place, not in the inputs */
+void plchost_each_variable(void (*use)(const struct plchost_variable*));
+void plchost_each_symbol(void (*use)(const struct plchost_symbol*));
+void plchost_bind(void); /* makes the program ready for its first cycle */
+
+/* From application.c: around each cycle of a task. */
+void plchost_begin(unsigned int task);
+void plchost_end(unsigned int task);
+
+/* From places.c. Declaring returns 0 if that fails. */
+int plchost_declare_places(void);
+void plchost_forget_places(void);
+void plchost_take_places(const struct plchost_task* task);
+void plchost_put_places(const struct plchost_task* task);
+/* The bit of a place in the memory area as it is now. Any thread. */
+unsigned char plchost_bit_now(unsigned int place);
+
+/* From symbols.c. Returns 0 if that fails. */
+int plchost_declare_symbols(void);
+
+/* From variables.c. */
+int plchost_declare_variables(void);
+void plchost_forget_variables(void);
+void plchost_keep_retained(const struct plchost_task* task);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

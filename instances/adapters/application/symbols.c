@@ -1,0 +1,42 @@
+/*
+ * The variables of the program that can be seen, written and forced from outside.
+ */
+#include <string.h>
+
+#include "plc_app.h"
+#include "plc_variables.h"
+#include "plchost_adapter.h"
+
+static RTS_RESULT declaring;
+
+static void declare(const struct plchost_symbol* symbol) {
+  Plc_Variable variable;
+  unsigned int i;
+  const int is_string = symbol->type == PLC_TYPE_STRING || symbol->type == PLC_TYPE_COUNTED_STRING;
+  RTS_RESULT result;
+  memset(&variable, 0, sizeof variable);
+  variable.dwSize = sizeof variable;
+  variable.pszName = symbol->name;
+  variable.dwType = symbol->type;
+  variable.dwFlags = symbol->read_only ? PLC_VARIABLE_READ_ONLY : 0;
+  variable.pAddress = symbol->value;
+  variable.dwBytes = is_string ? symbol->bytes : 0;
+  variable.nDimensions = symbol->dimensions;
+  for (i = 0; i < symbol->dimensions; ++i) {
+    variable.aDimensions[i].nFirst = symbol->dimension[i].first;
+    variable.aDimensions[i].nCount = symbol->dimension[i].count;
+    variable.aDimensions[i].dwStride = symbol->dimension[i].stride;
+  }
+  variable.pszTask = symbol->task;
+  variable.pszArea = symbol->area;
+  result = plc_declare_variable(&variable);
+  if (result != ERR_OK && declaring == ERR_OK) declaring = result;
+}
+
+/* A program with more variables than there is room for runs all the same: the log says so. */
+int plchost_declare_symbols(void) {
+  plchost_each_symbol(declare);
+  if (declaring == ERR_NOMEMORY)
+    plc_log(PLC_LOG_WARNING, "not all variables can be seen from outside: there are too many");
+  return declaring == ERR_OK || declaring == ERR_NOMEMORY;
+}

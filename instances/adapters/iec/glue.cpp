@@ -1,0 +1,227 @@
+#include "instances/adapters/iec/glue.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost::iec {
+
+namespace {
+
+std::string list_of(const std::vector<std::size_t>& numbers) {
+  return fmt::format("{}{}0", fmt::join(numbers, ", "), numbers.empty() ? "" : ", ");
+}
+
+unsigned first_bit(const Place& place) {
+  return place.offset * 8 + static_cast<unsigned>(std::max(place.bit, 0));
+}
+unsigned end_bit(const Place& place) {
+  return place.bit < 0 ? (place.offset + place.bytes) * 8 : first_bit(place) + 1;
+}
+
+}  // namespace
+
+GlueWriter::GlueWriter(const Project& project, const Configuration& configuration, const Resource& resource,
+                       Compiler compiler)
+    : project_(project),
+      configuration_(configuration),
+      resource_(resource),
+      plan_(plan_tasks(project, configuration, resource, compiler)),
+      variables_(variables_of(project, resource, plan_, compiler)) {
+  std::ranges::copy(variables_.remarks, std::back_inserter(plan_.remarks));
+  number_retained();
+}
+
+Glue GlueWriter::write() {
+  write_head();
+  print("const char plchost_application_name[] = \"{}\";\n", configuration_.name);
+  find_places();
+  find_aliases();
+  write_storage();
+  write_places();
+  refuse_shared_bits();
+  for (std::size_t i = 0; i < plan_.tasks.size(); ++i) write_task(plan_.tasks[i], i);
+  write_tasks();
+  write_variables();
+  write_symbols();
+  write_binding();
+  return {std::move(text_), std::move(plan_.problems), std::move(plan_.remarks)};
+}
+
+void GlueWriter::write_symbols() {
+  print("void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{ (void)use; }}\n");
+}
+
+Place GlueWriter::place_or_none(const Variable& variable) {
+  return place_of(variable.location).value_or(Place{.area = ' '});
+}
+
+void GlueWriter::write_places() {
+  std::string table;
+  for (const Known& known : places_) {
+    const Place& place = known.place;
+    table += fmt::format("  {{\"{}\", '{}', {}, {}, {}, {}u, &{}}},\n", known.name, place.area, place.bytes,
+                         place.bit, known.aliased ? 1 : 0, place.offset, known.value);
+  }
+  print(
+      "const unsigned int plchost_place_count = {};\nconst struct plchost_place plchost_places[] = {{\n{}  "
+      "{{0}}}};\nunsigned long long plchost_exchanged[{}];\n",
+      places_.size(), table, places_.size() + 1);
+}
+
+// In the order of their begins. One that begins before the others have ended shares bits.
+void GlueWriter::find_aliases() {
+  std::vector<std::size_t> order(places_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t number) {
+    return std::pair(places_[number].place.area, first_bit(places_[number].place));
+  });
+  unsigned end = 0;
+  for (const std::size_t number : order) {
+    const Place& place = places_[number].place;
+    const bool is_apart = groups_.empty() || places_[groups_.back().front()].place.area != place.area ||
+                          first_bit(place) >= end;
+    if (is_apart) groups_.emplace_back();
+    groups_.back().push_back(number);
+    end = is_apart ? end_bit(place) : std::max(end, end_bit(place));
+  }
+  std::erase_if(groups_, [](const auto& group) { return group.size() < 2; });
+  for (const auto& group : groups_) {
+    for (const std::size_t number : group) places_[number].aliased = true;
+  }
+}
+
+// A task has its own copy of the outputs, so one of the two would undo what the other one wrote.
+void GlueWriter::refuse_shared_bits() {
+  for (const auto& group : groups_) {
+    std::set<std::size_t> tasks;
+    for (const std::size_t number : group)
+      tasks.insert(places_[number].tasks.begin(), places_[number].tasks.end());
+    if (places_[group.front()].place.area != 'Q' || tasks.size() < 2) continue;
+    std::vector<std::string_view> names;
+    for (const std::size_t task : tasks) names.emplace_back(plan_.tasks[task].name);
+    plan_.problems.push_back(
+        {plan_.located.at(places_[group.back()].place).front()->place,
+         fmt::format("{} and {} share bits, and the tasks {} use them: use both in one task",
+                     places_[group.back()].location, places_[group.front()].location,
+                     fmt::join(names, ", "))});
+  }
+}
+
+void GlueWriter::write_task(const PlannedTask& task, std::size_t number) {
+  const std::size_t uses = write_uses(number);
+  print("static const unsigned int plchost_retained_{}[] = {{{}}};\n", number, list_of(retained_by(number)));
+  print("static void plchost_run_{0}(void) {{\n  plchost_begin({0});\n", number);
+  for (const Program* const program : task.programs) print("  {}\n", call(*program));
+  print("  plchost_end({});\n}}\n", number);
+  if (!task.single.empty()) write_edge(task, number);
+  if (task.extension.options) write_options(*task.extension.options, number);
+  use_counts_.push_back(uses);
+}
+
+void GlueWriter::write_edge(const PlannedTask& task, std::size_t number) {
+  const auto variable = plan_.globals.find(folded(task.single));
+  const Place place = variable == plan_.globals.end() ? Place{.area = ' '} : place_or_none(*variable->second);
+  const auto known = std::ranges::find(places_, place, &Known::place);
+  print("static unsigned char plchost_edge_{}(void) {{ return ", number);
+  if (known != places_.end() && place.area == 'M') {
+    print("plchost_bit_now({}); }}\n", known - places_.begin());
+  } else {
+    print("{}; }}\n", global(folded(task.single)));
+  }
+}
+
+// The number of them.
+std::size_t GlueWriter::write_uses(std::size_t number) {
+  std::string uses;
+  std::size_t count = 0;
+  const auto add = [&](std::size_t place, const std::string& value) {
+    const bool is_of_others = !places_[place].tasks.contains(number);
+    uses += fmt::format("  {{{}, &{}, {}, 0}},\n", place, value, is_of_others ? 1 : 0);
+    ++count;
+  };
+  const std::set<Place> own = write_own_inputs(number, add);
+  for (const std::size_t place : exchanged_by(number)) {
+    if (!own.contains(places_[place].place)) add(place, places_[place].value);
+  }
+  print("static struct plchost_use plchost_uses_{}[] = {{\n{}  {{0}}}};\n", number, uses);
+  return count;
+}
+
+// Those that its programs use, and the other outputs in the same bytes: a byte of the outputs is that of
+// the task that has changed it last.
+std::vector<std::size_t> GlueWriter::exchanged_by(std::size_t task) const {
+  std::set<unsigned> bytes;
+  for (const Place& place : plan_.tasks[task].places) {
+    for (unsigned i = 0; place.area == 'Q' && i < place.bytes; ++i) bytes.insert(place.offset + i);
+  }
+  std::vector<std::size_t> result;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const Known& known = places_[i];
+    const bool beside = known.place.area == 'Q' && known.place.bit >= 0 && !known.aliased &&
+                        !known.tasks.empty() && bytes.contains(known.place.offset);
+    if (beside || known.tasks.contains(task)) result.push_back(i);
+  }
+  return result;
+}
+
+// Their numbers among the retained ones.
+void GlueWriter::number_retained() {
+  std::size_t next = 0;
+  for (const ProgramVariable& variable : variables_.all) {
+    retained_number_.push_back(next);
+    if (variable.retain) ++next;
+  }
+}
+
+std::vector<std::size_t> GlueWriter::retained_by(std::size_t task) const {
+  std::vector<std::size_t> result;
+  for (const std::size_t variable : variables_.retained[task]) result.push_back(retained_number_[variable]);
+  return result;
+}
+
+void GlueWriter::write_options(const TaskOptions& options, std::size_t number) {
+  using std::chrono::microseconds;
+  const TaskWatchdog& watchdog = options.watchdog;
+  print("static const struct plchost_options plchost_options_{} = {{{}L, {}, {}, {}u, {}u, {}u, {}}};\n",
+        number, options.start_offset.count(), std::to_underlying(options.late),
+        options.drives_outputs ? 1 : 0, watchdog.time / microseconds(1), watchdog.sensitivity,
+        watchdog.omitted_cycles, std::to_underlying(watchdog.policy));
+}
+
+void GlueWriter::write_tasks() {
+  print("const unsigned int plchost_task_count = {};\nconst struct plchost_task plchost_tasks[] = {{\n",
+        plan_.tasks.size());
+  for (std::size_t i = 0; i < plan_.tasks.size(); ++i) {
+    const PlannedTask& task = plan_.tasks[i];
+    const std::string& event = task.extension.external_event;
+    print(
+        "  {{\"{0}\", {1}, {2}L, {3}, plchost_run_{4}, {5}, plchost_uses_{4}, {6}, "
+        "plchost_retained_{4}, {7}, {8}}},\n",
+        task.name, task.priority, task.interval_ns,
+        task.single.empty() ? "0" : fmt::format("plchost_edge_{}", i), i, use_counts_[i],
+        variables_.retained[i].size(), event.empty() ? "0" : fmt::format("\"{}\"", event),
+        task.extension.options ? fmt::format("&plchost_options_{}", i) : "0");
+  }
+  print("}};\n");
+}
+
+void GlueWriter::write_variables() {
+  print(
+      "void plchost_each_variable(void (*use)(const struct plchost_variable*)) {{\n"
+      "  struct plchost_variable v;\n  (void)use;\n  (void)v;\n");
+  for (const ProgramVariable& variable : variables_.all) {
+    print(
+        "  v.path = \"{0}\"; v.value = &{1}; v.bytes = sizeof {1}; v.layout = {2}ull; v.retain = {3}; "
+        "use(&v);\n",
+        variable.path, variable.value, variable.layout, variable.retain ? 1 : 0);
+  }
+  print("}}\n");
+}
+
+}  // namespace plchost::iec

@@ -1,0 +1,190 @@
+#include "instances/adapters/iec/variables.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost::iec {
+
+namespace {
+
+constexpr std::size_t kMostNested = 32;
+/// The types of variables with references begin so.
+constexpr std::string_view kReference = "REFERENCE ";
+
+/// They hold times of a clock that begins anew when the machine does.
+constexpr std::array<std::string_view, 3> kTimers{"TON", "TOF", "TP"};
+constexpr std::array<std::string_view, 22> kElementary{
+    "BOOL", "SINT", "INT", "DINT", "LINT",   "USINT", "UINT", "UDINT", "ULINT", "REAL",  "LREAL",
+    "TIME", "DATE", "TOD", "DT",   "STRING", "BYTE",  "WORD", "DWORD", "LWORD", "ARRAY", "TIME_OF_DAY"};
+
+std::uint64_t hash_of(std::string_view text, std::uint64_t seed = 0xcbf29ce484222325U) {
+  for (const char letter : text) seed = (seed ^ static_cast<unsigned char>(letter)) * 0x100000001b3U;
+  return seed;
+}
+
+std::string first_word(const std::string& type) {
+  return folded(type.substr(0, type.find_first_of(" ([")));
+}
+
+class Collector {
+ public:
+  Collector(const Project& project, const Resource& resource, const TaskPlan& plan, Compiler compiler)
+      : project_(project), resource_(resource), plan_(plan), compiler_(compiler) {}
+
+  ProgramVariables collect() {
+    found_.retained.resize(plan_.tasks.size());
+    for (std::size_t i = 0; i < plan_.tasks.size(); ++i) {
+      for (const Program* const program : plan_.tasks[i].programs) add_program(*program, i);
+    }
+    for (const auto& [name, variable] : plan_.globals) add_global(name, *variable);
+    return std::move(found_);
+  }
+
+ private:
+  /// Where a variable stands.
+  struct Within {
+    std::string path;   // with a dot at its end
+    std::string value;  // the same
+    bool retain = false;
+    std::size_t depth = 0;
+  };
+
+  void add_program(const Program& program, std::size_t task) {
+    const Pou* const type = project_.pou(program.type);
+    if (type == nullptr) return;
+    const std::size_t before = found_.all.size();
+    const std::string name = folded(program.name);
+    add_all(*type, {name + ".", instance(name) + ".", program.retain, 0});
+    add_retained(before, task);
+  }
+
+  [[nodiscard]] std::string instance(const std::string& name) const {
+    if (compiler_ == Compiler::strucpp) return "g_config." + name;
+    return (resource_.name.empty() ? "RESOURCE" : folded(resource_.name)) + "__" + name;
+  }
+
+  void add_global(const std::string& name, const Variable& variable) {
+    if (variable.constant || !variable.location.empty() || !is_kept(variable)) return;
+    if (compiler_ == Compiler::matiec && !is_data(first_word(variable.type))) return;  // a function block
+    const std::size_t before = found_.all.size();
+    const Pou* const block = project_.pou(first_word(variable.type));
+    if (block != nullptr) {
+      add_all(*block, {name + ".", "strucpp::" + variable.member + ".", variable.retain, 0});
+    } else {
+      found_.all.push_back({name,
+                            compiler_ == Compiler::strucpp ? "strucpp::" + variable.member
+                                                           : fmt::format("*__GET_GLOBAL_{}()", name),
+                            layout_of(variable.type), variable.retain});
+    }
+    for (std::size_t task = 0; task < plan_.tasks.size(); ++task) {
+      if (plan_.tasks[task].globals.contains(name)) add_retained(before, task);
+    }
+  }
+  void add_retained(std::size_t from, std::size_t task) {
+    for (std::size_t i = from; i < found_.all.size(); ++i) {
+      if (found_.all[i].retain) found_.retained[task].push_back(i);
+    }
+  }
+
+  void add_all(const Pou& pou, const Within& within) {
+    if (within.depth > kMostNested) return;
+    for (const Variable& variable : pou.variables) {
+      using Section = Variable::Section;
+      const bool is_own = variable.section == Section::input || variable.section == Section::output ||
+                          variable.section == Section::local;
+      if (is_own && !variable.constant && variable.location.empty() && is_kept(variable))
+        add(variable, within);
+    }
+    if (!pou.chart.empty()) add_steps(pou, within);
+  }
+
+  void add(const Variable& variable, const Within& within) {
+    const std::string type = first_word(variable.type);
+    const std::string path = within.path + folded(variable.name);
+    const std::string value =
+        within.value + (variable.member.empty() ? folded(variable.name) : variable.member);
+    const bool is_timer = std::ranges::find(kTimers, type) != kTimers.end();
+    const bool retain = within.retain || variable.retain;
+    if (is_timer && retain) {
+      found_.remarks.push_back(
+          {variable.place,
+           fmt::format("{} is a {}: a timer begins anew at each start, RETAIN or not", variable.name, type)});
+    }
+    const Pou* const block = project_.pou(type);
+    if (block != nullptr)
+      return add_all(*block, {path + ".", value + ".", retain && !is_timer, within.depth + 1});
+    const bool has_flags = compiler_ == Compiler::matiec && is_data(type);
+    found_.all.push_back(
+        {path, value + (has_flags ? ".value" : ""), layout_of(variable.type), retain && !is_timer});
+  }
+  // One that points into this version of the program means nothing in another one.
+  bool is_kept(const Variable& variable) {
+    if (!variable.type.starts_with(kReference)) return true;
+    if (variable.retain) {
+      found_.remarks.push_back(
+          {variable.place, fmt::format("RETAIN of {} is not carried out: it has references", variable.name)});
+    }
+    return false;
+  }
+
+  // Which steps of a sequential function chart are active, and since when. With other steps they mean
+  // something else.
+  void add_steps(const Pou& pou, const Within& within) {
+    for (const std::string_view list : {"step_list", "action_list", "lasttick_time"}) {
+      found_.all.push_back({fmt::format("{}SFC.{}", within.path, list),
+                            fmt::format("{}__{}", within.value, list), hash_of(pou.chart), false});
+    }
+  }
+
+  [[nodiscard]] bool is_data(const std::string& type) const {
+    return std::ranges::find(kElementary, type) != kElementary.end() || type == "DATE_AND_TIME" ||
+           declared(type) != nullptr;
+  }
+  [[nodiscard]] const DeclaredType* declared(const std::string& type) const {
+    const auto found = std::ranges::find_if(
+        project_.types, [&](const DeclaredType& known) { return folded(known.name) == type; });
+    return found == project_.types.end() ? nullptr : &*found;
+  }
+  // Of its words, and of those of the types that are named in it.
+  [[nodiscard]] std::uint64_t layout_of(const std::string& type, std::size_t depth = 0) const {
+    const std::string text = folded(type);
+    std::uint64_t hash = hash_of(text);
+    for (const DeclaredType& known : project_.types) {
+      if (depth > kMostNested || !names(text, folded(known.name))) continue;
+      hash = hash_of(fmt::format("{}", layout_of(known.definition, depth + 1)), hash);
+    }
+    return hash;
+  }
+  // Whether the name is one of the words of the text.
+  static bool names(std::string_view text, std::string_view name) {
+    const auto is_letter = [&](std::size_t at) {
+      return at < text.size() && (std::isalnum(static_cast<unsigned char>(text[at])) != 0 || text[at] == '_');
+    };
+    for (std::size_t at = text.find(name); at != std::string_view::npos; at = text.find(name, at + 1)) {
+      if (!is_letter(at - 1) && !is_letter(at + name.size())) return true;
+    }
+    return false;
+  }
+
+  const Project& project_;
+  const Resource& resource_;
+  const TaskPlan& plan_;
+  Compiler compiler_;
+  ProgramVariables found_;
+};
+
+}  // namespace
+
+ProgramVariables variables_of(const Project& project, const Resource& resource, const TaskPlan& plan,
+                              Compiler compiler) {
+  return Collector(project, resource, plan, compiler).collect();
+}
+
+}  // namespace plchost::iec

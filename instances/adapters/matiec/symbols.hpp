@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "instances/adapters/iec/place.hpp"
+#include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/task_plan.hpp"
+
+namespace plchost::matiec {
+
+/// A variable of an elementary type that others can see: see plc_variables.h.
+struct Symbol {
+  struct Dimension {
+    int first = 0;
+    unsigned count = 0;
+    std::string stride;  ///< of its elements, in C: "sizeof(RES__MAIN.GRID.value.table[0])"
+  };
+  std::string name;   ///< as in the source, with "[]" for each dimension
+  unsigned type = 0;  ///< PLC_TYPE_...
+  std::string value;  ///< in C, for `&` and sizeof: that of the first element
+  std::vector<Dimension> dimensions;
+  std::string task;  ///< the only one that uses it; empty: several
+  std::string area;  ///< "%QX0.1"; empty: none
+  bool read_only = false;
+};
+
+/// Where a located variable has its value, in C, for a program of task number `task`, or for all. Empty: it
+/// has none.
+using ValueOfPlace = std::function<std::string(const iec::Place& place, std::optional<std::size_t> task)>;
+
+struct Symbols {
+  std::vector<Symbol> all;
+  iec::SourceProblems remarks;  ///< variables that are left out, and why
+};
+
+/// Of all programs of the resource, the function blocks in them, and globals.
+[[nodiscard]] Symbols symbols_of(const iec::Project& project, const iec::Resource& resource,
+                                 const iec::TaskPlan& plan, const ValueOfPlace& value_of_place);
+
+}  // namespace plchost::matiec

@@ -1,0 +1,129 @@
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/matiec/glue.hpp"
+#include "instances/adapters/matiec/iec2c.hpp"
+#include "instances/adapters/matiec/located.hpp"
+#include "instances/adapters/translator.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr const char* kConfigurationFile = "plchost_configuration.c";
+
+class MatiecTranslator : public Translator {
+ public:
+  explicit MatiecTranslator(BuildContext& context) : context_(context) {}
+
+  [[nodiscard]] iec::Compiler compiler() const noexcept override { return iec::Compiler::matiec; }
+
+  bool read() override {
+    auto [project, problems] = iec::read_project(context_.sources);
+    context_.project = std::move(project);
+    std::ranges::move(problems, std::back_inserter(context_.report.problems));
+    if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
+    return context_.good();
+  }
+
+  bool translate() override {
+    auto compiler = matiec::find_compiler(context_.order.matiec);
+    auto words = context_.words_of("CC", "cc");
+    if (!context_.has(compiler) || !words || !context_.open_folder()) return false;
+    compiler_ = *std::move(compiler);
+    words_ = *std::move(words);
+    const matiec::JoinedSource joined(context_.sources);
+    if (!context_.has(context_.folder().write(std::string(matiec::kJoinedFile), joined.text()))) return false;
+    return run(joined) && read_located();
+  }
+
+  [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
+    return matiec::write_glue(context_.project, configuration(), resource, located_);
+  }
+
+  bool compile(const std::string& name, const std::string& glue, const std::filesystem::path& made) override {
+    const std::string file = name + ".c";
+    if (!context_.has(context_.folder().write(file, "#include \"plchost_library.h\"\n" + glue))) return false;
+    const std::string adapters = context_.adapters();
+    std::vector<std::string> sources = context_.application_files();
+    sources.insert(sources.begin(), {file, kConfigurationFile});
+    return context_.compile("the C compiler", words_,
+                            {.sources = std::move(sources),
+                             .folders = {adapters, adapters + "/application", adapters + "/matiec",
+                                         std::filesystem::absolute(compiler_.headers)},
+                             .output = made});
+  }
+
+ private:
+  [[nodiscard]] const iec::Configuration& configuration() const {
+    return context_.project.configurations.front();
+  }
+
+  // iec2c makes a file of each of these names. The files of the library are found by name, too.
+  void check_file_names() {
+    std::vector<std::string> names{"POUS", "LOCATED_VARIABLES", "IEC_STD_LIB", "ACCESSOR"};
+    const auto check = [&](const char* kind, const std::string& given, const iec::SourcePlace& place) {
+      const std::string name = iec::folded(given);
+      if (std::ranges::find(names, name) != names.end() || name.starts_with("PLCHOST_")) {
+        context_.fail({place, fmt::format("{} {}: a file of the build or another RESOURCE has this name; "
+                                          "choose another one",
+                                          kind, given)});
+      }
+      names.push_back(name);
+    };
+    check("CONFIGURATION", configuration().name, configuration().place);
+    for (const iec::Resource& resource : configuration().resources)
+      check("RESOURCE", resource.name, resource.place);
+  }
+
+  bool run(const matiec::JoinedSource& joined) {
+    namespace fs = std::filesystem;
+    const auto end =
+        context_.run("iec2c",
+                     {fs::absolute(compiler_.program), "-f", "-p", "-l", "-I",
+                      fs::absolute(compiler_.library), "-T", ".", std::string(matiec::kJoinedFile)},
+                     context_.order.translate_limit);
+    if (!end) return false;
+    std::ranges::move(matiec::problems_of(end->output, joined, context_.project, compiler_.library),
+                      std::back_inserter(context_.report.problems));
+    if (context_.good() && end->signal != 0) {
+      context_.fail(
+          fmt::format("iec2c was ended by SIG{}, and has not said which line it could not translate",
+                      ::sigabbrev_np(end->signal)));
+    } else if (context_.good() && end->exit_code != 0) {
+      context_.fail("iec2c has failed:" + first_lines(end->output));
+    }
+    return context_.good() && context_.has(context_.folder().check_room());
+  }
+
+  bool read_located() {
+    auto located = context_.folder().read("LOCATED_VARIABLES.h");
+    if (!located) {
+      context_.fail("iec2c has not done its work: " + located.error().describe());
+      return false;
+    }
+    located_ = matiec::located_variables(*located);
+    return context_.has(context_.folder().write(
+        kConfigurationFile,
+        fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
+  }
+
+  BuildContext& context_;
+  matiec::Compiler compiler_;
+  std::vector<std::string> words_;
+  std::vector<matiec::Located> located_;
+};
+
+}  // namespace
+
+std::unique_ptr<Translator> make_matiec_translator(BuildContext& context) {
+  return std::make_unique<MatiecTranslator>(context);
+}
+
+}  // namespace plchost

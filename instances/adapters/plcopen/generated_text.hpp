@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/adapters/iec/source_place.hpp"
+
+namespace plchost::plcopen {
+
+/// A line of a body.
+struct BodyLine {
+  std::string text;
+  unsigned line = 0;  ///< of the XML file
+};
+
+/// ST that is made from XML, and where in the XML each of its lines stands.
+class GeneratedText {
+ public:
+  /// One line; `xml_line` is that of the element that it says.
+  void add(std::string_view line, unsigned xml_line);
+  void add_body(const std::vector<BodyLine>& lines, const std::string& pou);
+  /// The last line of a POU: errors about the end of its body are told there.
+  void end_body(std::string_view line);
+
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+  /// A problem of this text becomes one of the XML.
+  void restore(iec::SourceProblem& problem) const;
+
+ private:
+  struct Origin {
+    unsigned xml_line = 0;
+    unsigned body_line = 0;  // from 1; 0: it is in no body
+    std::size_t pou = 0;     // of pous_
+  };
+
+  std::string text_;
+  std::vector<Origin> origins_;  // of each line
+  std::vector<std::string> pous_;
+};
+
+}  // namespace plchost::plcopen

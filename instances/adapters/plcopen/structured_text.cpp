@@ -1,0 +1,96 @@
+#include "instances/adapters/plcopen/structured_text.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+
+#include <fmt/format.h>
+#include <pugixml.hpp>
+
+#include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/plcopen/instances_part.hpp"
+#include "instances/adapters/plcopen/pous.hpp"
+#include "instances/adapters/plcopen/project_file.hpp"
+
+namespace plchost::plcopen {
+
+namespace {
+
+using pugi::xml_node;
+
+/// CODESYS writes the POUs of an application into its resource.
+void add_types_of_resources(ProjectFile& file, const xml_node& configurations, GeneratedText& text) {
+  for (const xml_node& resource : configurations.children()) {
+    for (const xml_node& added : resource.child("addData").children()) {
+      for (const xml_node& part : added.children()) {
+        if (file.name_of(part) == "pou") add_pou(file, part, text);
+        if (file.name_of(part) == "dataType") add_data_type(file, part, text);
+      }
+    }
+  }
+}
+
+void add_project(ProjectFile& file, GeneratedText& text) {
+  const auto pou = [&](const xml_node& one) { add_pou(file, one, text); };
+  const auto data_type = [&](const xml_node& one) { add_data_type(file, one, text); };
+  const auto types = [&](const xml_node& one) {
+    file.read(one, "types",
+              {{"dataTypes",
+                [&](const xml_node& list) { file.read(list, "dataTypes", {{"dataType", data_type}}); }},
+               {"pous", [&](const xml_node& list) { file.read(list, "pous", {{"pou", pou}}); }}});
+  };
+  const auto configuration = [&](const xml_node& one) {
+    add_types_of_resources(file, one, text);
+    add_configuration(file, one, text);
+  };
+  const auto instances = [&](const xml_node& one) {
+    file.read(one, "instances", {{"configurations", [&](const xml_node& list) {
+                                    file.read(list, "configurations", {{"configuration", configuration}});
+                                  }}});
+  };
+  const auto nothing = [](const xml_node&) {};
+  file.read(file.project(), "project",
+            {{"types", types},
+             {"instances", instances},
+             {"fileHeader", nothing},
+             {"contentHeader", nothing},
+             {"pou", pou},
+             {"dataType", data_type}});
+}
+
+}  // namespace
+
+bool is_project_file(std::string_view name) {
+  return iec::folded(name).ends_with(".XML");
+}
+
+StructuredText structured_text_of(const iec::Source& xml) {
+  ProjectFile file(xml.text, xml.file);
+  StructuredText result;
+  if (file.project()) add_project(file, result.text);
+  result.problems = file.problems();
+  result.remarks = file.remarks();
+  return result;
+}
+
+iec::Source ProjectSources::take(const iec::Source& xml, iec::SourceProblems& problems) {
+  StructuredText read = structured_text_of(xml);
+  std::ranges::move(read.remarks, std::back_inserter(remarks_));
+  iec::Source source{.file = xml.file, .text = read.text.text()};
+  // With a problem the build ends before anybody reads the ST.
+  if (read.problems.empty()) texts_.emplace_back(xml.file, std::move(read.text));
+  std::ranges::move(read.problems, std::back_inserter(problems));
+  return source;
+}
+
+void ProjectSources::restore(iec::SourceProblems& problems, iec::SourceProblems& remarks) const {
+  for (auto* const told : {&problems, &remarks}) {
+    for (iec::SourceProblem& problem : *told) {
+      const auto text = std::ranges::find(texts_, problem.place.file, &decltype(texts_)::value_type::first);
+      if (text != texts_.end()) text->second.restore(problem);
+    }
+  }
+  std::ranges::copy(remarks_, std::back_inserter(remarks));
+}
+
+}  // namespace plchost::plcopen

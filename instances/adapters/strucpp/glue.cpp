@@ -1,0 +1,81 @@
+#include "instances/adapters/strucpp/glue.hpp"
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost::strucpp {
+
+namespace {
+
+using iec::folded;
+
+class Writer : public iec::GlueWriter {
+ public:
+  Writer(const iec::Project& project, const iec::Configuration& configuration, const iec::Resource& resource,
+         std::span<const std::string> files)
+      : GlueWriter(project, configuration, resource, iec::Compiler::strucpp), files_(files) {}
+
+ private:
+  void write_head() override {
+    print("// Written by plcctl build application.\n#include \"plchost_strucpp.hpp\"\n");
+    for (const std::string& file : files_) print("#include \"{}\"\n", file);
+    print("\nstrucpp::Configuration_{} g_config;\n", folded(configuration().name));
+  }
+
+  // Each variable has a value of its own, also where two have one location.
+  void find_places() override {
+    for (std::size_t i = 0; i < plan().tasks.size(); ++i) {
+      for (const iec::Program* const program : plan().tasks[i].programs) add_program(*program, i);
+    }
+    for (const auto& [name, variable] : plan().globals) {
+      if (variable->location.empty()) continue;
+      std::set<std::size_t> tasks;
+      for (std::size_t i = 0; i < plan().tasks.size(); ++i) {
+        if (plan().tasks[i].globals.contains(name)) tasks.insert(i);
+      }
+      add(name, "strucpp::" + variable->member, *variable, std::move(tasks));
+    }
+  }
+  void add_program(const iec::Program& program, std::size_t task) {
+    const iec::Pou* const type = project().pou(program.type);
+    if (type == nullptr) return;
+    for (const iec::Variable& variable : type->variables) {
+      if (variable.location.empty() || variable.member.empty()) continue;
+      const std::string name = folded(program.name);
+      add(fmt::format("{}.{}", name, folded(variable.name)),
+          fmt::format("g_config.{}.{}", name, variable.member), variable, {task});
+    }
+  }
+  void add(const std::string& name, const std::string& value, const iec::Variable& variable,
+           std::set<std::size_t> tasks) {
+    // Without one there is a problem already.
+    const auto place = iec::place_of(variable.location);
+    if (!place) return;
+    places().push_back({.name = name,
+                        .value = fmt::format("*{}.raw_ptr()", value),
+                        .location = variable.location,
+                        .place = *place,
+                        .tasks = std::move(tasks)});
+  }
+
+  [[nodiscard]] std::string call(const iec::Program& program) const override {
+    return fmt::format("plchost_run(g_config.{});", folded(program.name));
+  }
+  [[nodiscard]] std::string global(const std::string& name) const override {
+    return fmt::format("*strucpp::{}.raw_ptr() ? 1 : 0", plan().globals.at(name)->member);
+  }
+  // The constructors have done it.
+  void write_binding() override { print("void plchost_bind(void) {{}}\n"); }
+
+  std::span<const std::string> files_;
+};
+
+}  // namespace
+
+iec::Glue write_glue(const iec::Project& project, const iec::Configuration& configuration,
+                     const iec::Resource& resource, std::span<const std::string> files) {
+  return Writer(project, configuration, resource, files).write();
+}
+
+}  // namespace plchost::strucpp

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/source_place.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost::strucpp {
+
+/// A program as translate.mjs has read it.
+struct ReadPlan {
+  iec::Project project;
+  std::vector<std::string> files;  ///< of C++, that STruC++ has written
+  iec::SourceProblems problems;    ///< errors of the compiler, and those of tasks
+  iec::SourceProblems remarks;
+};
+
+/// Reads plan.json. `sources`: the names of the files, by their number in it. Any text, hostile ones
+/// included: an error names the value that is wrong, and what is allowed. Texts that go into C++ have only
+/// letters that can do no harm there.
+[[nodiscard]] Result<ReadPlan> read_plan(std::string_view text, std::span<const std::string> sources);
+
+}  // namespace plchost::strucpp

@@ -1,0 +1,348 @@
+// Calls the compiler STruC++ for `plcctl build application`: node translate.mjs FOLDER_OF_THE_COMPILER, in the
+// folder for the files between. Reads order.json there: {"sources": [{"name", "text"}]}. Writes the C++ files and
+// plan.json: what is wrong, else the program's tasks, POUs, types and variables, which plcctl checks and plans.
+// Exit code 0: plan.json was written, also if the program has errors.
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const kMostMessages = 100; // more are not told
+const kMostElements = 1000; // of an array of function blocks, each with variables of its own
+
+const folder = resolve(process.argv[2]);
+const { sources } = JSON.parse(readFileSync('order.json', 'utf8'));
+const { compile, discoverStlibs } = await import(pathToFileURL(join(folder, 'dist', 'node', 'index.js')).href);
+
+const fileNumbers = new Map(sources.map((source, i) => [source.name, i]));
+const lines = sources.map((source) => source.text.split('\n'));
+
+function place(file, line, column) {
+  return [fileNumbers.get(file) ?? -1, line > 0 ? line : 0, column > 0 ? column : 0];
+}
+function placeOf(node) {
+  const span = node?.sourceSpan;
+  return span === undefined ? [-1, 0, 0] : place(span.file, span.startLine, span.startCol);
+}
+function message(found) {
+  const hint = found.suggestion === undefined ? '' : ` ${found.suggestion}`;
+  // A message of several lines is told as one.
+  const text = `${found.message}${hint}`.replace(/[\0-\x1f\x7f]+/g, ' ').slice(0, 1000);
+  return { place: place(found.file ?? sources[0].name, found.line, found.column), text };
+}
+
+// A POU of the program and one of a library with the same name would both go into the C++. That of the program counts.
+function libraries() {
+  const own = new Set();
+  for (const { text } of sources) {
+    const plain = text.replace(/\(\*[\s\S]*?\*\)|\/\*[\s\S]*?\*\/|\/\/[^\n]*/g, ' ');
+    for (const [, name] of plain.matchAll(/^\s*FUNCTION(?:_BLOCK)?\s+(?:ABSTRACT\s+|FINAL\s+)*(\w+)/gim)) own.add(name.toUpperCase());
+  }
+  const isOfLibrary = (one) => !own.has(one.name.toUpperCase());
+  return discoverStlibs(join(folder, 'libs')).map((archive) => ({
+    ...archive,
+    chunks: archive.chunks?.filter(isOfLibrary),
+    manifest: {
+      ...archive.manifest,
+      functions: archive.manifest.functions.filter(isOfLibrary),
+      functionBlocks: archive.manifest.functionBlocks.filter(isOfLibrary),
+    },
+  }));
+}
+
+function translate() {
+  const [first, ...others] = sources;
+  try {
+    return compile(first.text, {
+      debug: true,
+      lineMapping: true,
+      lineDirectives: true,
+      optimizationLevel: 0,
+      fileName: first.name,
+      additionalSources: others.map((other) => ({ source: other.text, fileName: other.name })),
+      libraries: libraries(),
+    });
+  } catch (error) {
+    // The compiler throws for what it does not support, without a place.
+    return { success: false, errors: [{ message: String(error?.message ?? error), line: 0, column: 0 }], warnings: [] };
+  }
+}
+
+// The compiler knows names in upper case only. As it stands in the source: behind its key word.
+function nameAsWritten(node, words) {
+  const [file, line, column] = placeOf(node);
+  const text = file < 0 ? '' : lines[file].slice(line - 1, line + 3).join('\n').slice(column - 1);
+  const found = new RegExp(`^\\s*(?:${words})\\s+(\\w+)`, 'i').exec(text);
+  const name = node.name ?? node.instanceName;
+  return found !== null && found[1].toUpperCase() === name.toUpperCase() ? found[1] : name;
+}
+
+// The names of a declaration: a, b AT %IX0.0 : BOOL.
+function namesAsWritten(declaration) {
+  const [file, line, column] = placeOf(declaration);
+  const text = file < 0 ? '' : lines[file].slice(line - 1, line + 9).join('\n').slice(column - 1);
+  const written = (/^([\w\s,]+?)\s*(?:\bAT\b|:)/i.exec(text)?.[1] ?? '').split(',').map((name) => name.trim());
+  return declaration.names.map((name, i) => (written[i]?.toUpperCase() === name.toUpperCase() ? written[i] : name));
+}
+
+// All nodes below one, in any order.
+function* nodesIn(root) {
+  const open = [root];
+  while (open.length > 0) {
+    const node = open.pop();
+    if (node === null || typeof node !== 'object') continue;
+    if (typeof node.kind === 'string') yield node;
+    const values = node instanceof Map ? node.values() : Object.entries(node).filter(([key]) => key !== 'parent' && key !== 'sourceSpan').map(([, value]) => value);
+    for (const value of values) open.push(value);
+  }
+}
+
+class Plan {
+  constructor(result) {
+    this.ast = result.ast;
+    this.header = result.headerCode;
+    this.remarks = [];
+    this.classes = this.readClasses();
+    this.blocks = new Map(this.ast.functionBlocks.map((block) => [block.name.toUpperCase(), block]));
+    this.functions = new Set(this.ast.functions.map((one) => one.name.toUpperCase()));
+    this.types = new Map(this.ast.types.map((type) => [type.name.toUpperCase(), type]));
+    this.globals = this.readGlobals();
+  }
+
+  // The members of each class of the header: it says how they are called in C++, and has those of libraries.
+  readClasses() {
+    const classes = new Map();
+    for (const [, name, body] of this.header.matchAll(/^class (\w+)(?: *: *[^{;]*)? \{\n([\s\S]*?)^\};/gm)) {
+      const members = new Map();
+      for (const [, type, member] of body.matchAll(/^ {4}(?!static |explicit |virtual |using |friend )(\w[\w:<>, *&-]*?[>\w*&]) ?\b(\w+)(?: *=[^;\n]*|\{[^;\n]*\})?;/gm)) {
+        members.set(member, type);
+      }
+      classes.set(name, members);
+    }
+    return classes;
+  }
+
+  remark(node, text) {
+    this.remarks.push({ place: placeOf(node), text });
+  }
+
+  // Whether values of a type cannot be copied from one version of the program to another.
+  hasReferences(name, depth = 0) {
+    const upper = name.toUpperCase();
+    if (depth > 32 || this.isBlock(upper) || this.ast.interfaces.some((one) => one.name.toUpperCase() === upper)) return true;
+    const definition = this.types.get(upper)?.definition;
+    if (definition === undefined) return false;
+    if (definition.kind === 'StructDefinition') return definition.fields.some((field) => this.isReference(field.type, depth + 1));
+    if (definition.kind === 'ArrayDefinition') return this.isReference(definition.elementType, depth + 1);
+    return definition.kind === 'TypeReference' && this.isReference(definition, depth + 1);
+  }
+  isReference(type, depth = 0) {
+    return type.isReference || (type.referenceKind ?? 'none') !== 'none' || this.hasReferences(type.elementTypeName ?? type.name, depth);
+  }
+  isBlock(name) {
+    return this.blocks.has(name) || (this.classes.has(name) && !name.startsWith('Program_') && !name.startsWith('Configuration_'));
+  }
+
+  typeText(type) {
+    let text = type.elementTypeName ?? type.name;
+    if (type.maxLength !== undefined) text += `(${type.maxLength})`;
+    if (type.arrayDimensions !== undefined) text = `ARRAY [${type.arrayDimensions.map((d) => `${d.start}..${d.end}`).join(', ')}] OF ${text}`;
+    return text;
+  }
+
+  // A declared variable; of an array of function blocks its elements.
+  variables(block, declaration, name, member, node) {
+    const sections = { VAR_INPUT: 'input', VAR_OUTPUT: 'output', VAR_IN_OUT: 'in_out', VAR_TEMP: 'temporary', VAR_EXTERNAL: 'external', VAR_GLOBAL: 'global' };
+    const variable = {
+      name,
+      type: this.typeText(declaration.type),
+      location: declaration.address ?? '',
+      section: sections[block.blockType] ?? 'local',
+      retain: block.isRetain === true,
+      constant: block.isConstant === true,
+      place: placeOf(node),
+      member: member ?? '',
+    };
+    if (member === undefined && variable.section !== 'external') variable.section = 'other';
+    const element = declaration.type.elementTypeName?.toUpperCase();
+    const dimensions = declaration.type.arrayDimensions;
+    if (element !== undefined && dimensions !== undefined && this.isBlock(element)) return this.elements(variable, element, dimensions);
+    const isBlock = this.isBlock(declaration.type.name.toUpperCase()) && (declaration.type.referenceKind ?? 'none') === 'none';
+    if (!isBlock && this.isReference(declaration.type)) variable.type = `REFERENCE ${variable.type}`;
+    return [variable];
+  }
+  elements(variable, type, dimensions) {
+    let indexes = [[]];
+    for (const { start, end } of dimensions) {
+      if (indexes.length * (end - start + 1) > kMostElements) {
+        this.remarks.push({ place: variable.place, text: `${variable.name} has more than ${kMostElements} function blocks: they begin anew in an online change, and are not retained` });
+        return [];
+      }
+      indexes = indexes.flatMap((before) => Array.from({ length: end - start + 1 }, (_, i) => [...before, start + i]));
+    }
+    return indexes.map((index) => ({
+      ...variable,
+      // No letter of a name that plcctl knows is a minus.
+      name: `${variable.name}.${index.map((i) => `${i}`.replace('-', 'm')).join('.')}`,
+      type,
+      member: index.length === 1 ? `${variable.member}[${index[0]}]` : `${variable.member}(${index.join(', ')})`,
+    }));
+  }
+
+  // As the compiler calls a member, which it does not always call as the source does.
+  memberOf(className, name) {
+    const members = this.classes.get(className);
+    return [name, `${name}_`].find((candidate) => members?.has(candidate));
+  }
+
+  declared(pou, className) {
+    const found = [];
+    for (const block of pou.varBlocks) {
+      for (const declaration of block.declarations) {
+        for (const name of namesAsWritten(declaration)) {
+          const member = block.blockType === 'VAR_EXTERNAL' || block.blockType === 'VAR_TEMP' ? undefined : this.memberOf(className, name.toUpperCase());
+          found.push(...this.variables(block, declaration, name, member, declaration));
+        }
+      }
+    }
+    return found;
+  }
+
+  // What a POU reaches without declaring it: globals, and the functions that it calls.
+  reached(pou) {
+    const own = new Set(pou.varBlocks.flatMap((block) => block.declarations.flatMap((declaration) => declaration.names.map((name) => name.toUpperCase()))));
+    const externals = new Set();
+    const calls = new Set();
+    for (const node of nodesIn(pou)) {
+      const name = (node.kind === 'FunctionCallExpression' ? node.functionName : node.kind === 'VariableExpression' ? node.name : '').toUpperCase();
+      if (name === '' || own.has(name)) continue;
+      if (this.functions.has(name)) calls.add(name);
+      if (this.globals.names.has(name)) externals.add(name);
+      if (node.kind === 'NewExpression') this.remark(node, `${pou.name} takes memory while it runs (__NEW): its cycles may take longer than planned`);
+    }
+    const base = { location: '', retain: false, constant: false, place: placeOf(pou), member: '' };
+    return [
+      ...[...externals].map((name) => ({ ...base, name, type: this.globals.names.get(name), section: 'external' })),
+      ...[...calls].map((name) => ({ ...base, name: `CALL.${name}`, type: name, section: 'other' })),
+    ];
+  }
+
+  // Those of the blocks that it extends are its own, too.
+  blockVariables(block, depth = 0) {
+    const base = block.extends?.toUpperCase();
+    let inherited = [];
+    if (base !== undefined && depth < 32) {
+      inherited = this.blocks.has(base) ? this.blockVariables(this.blocks.get(base), depth + 1) : this.libraryVariables(base);
+    }
+    return [...inherited, ...this.declared(block, block.name), ...this.reached(block)];
+  }
+  libraryVariables(name) {
+    const found = [];
+    for (const [member, type] of this.classes.get(name) ?? []) {
+      if (member === 'ENO') continue;
+      const variable = { name: member.replace(/_$/, ''), type, location: '', section: 'local', retain: false, constant: false, place: [-1, 0, 0], member };
+      const array = /^Array1D<(\w+), (-?\d+), (-?\d+)>$/.exec(type);
+      if (array !== null && this.isBlock(array[1])) {
+        found.push(...this.elements(variable, array[1], [{ start: Number(array[2]), end: Number(array[3]) }]));
+        continue;
+      }
+      const names = type.match(/\w+/g) ?? [];
+      if (/[*&]|IEC_REF_TO|IEC_REFERENCE_TO|IEC_Ptr/.test(type) || (!this.isBlock(type) && names.some((one) => this.isBlock(one)))) variable.type = `REFERENCE ${type}`;
+      found.push(variable);
+    }
+    return found;
+  }
+
+  readGlobals() {
+    const names = new Map();
+    const found = [];
+    const add = (block, wrap) => {
+      for (const declaration of block.declarations) {
+        for (const name of namesAsWritten(declaration)) {
+          names.set(name.toUpperCase(), this.typeText(declaration.type));
+          found.push(...this.variables({ ...block, blockType: 'VAR_GLOBAL' }, declaration, name, wrap(name.toUpperCase()), declaration));
+        }
+      }
+    };
+    for (const configuration of this.ast.configurations) {
+      for (const block of configuration.varBlocks) add(block, (name) => `${name}.value`);
+    }
+    for (const block of this.ast.globalVarBlocks) add(block, (name) => name);
+    return { names, found };
+  }
+
+  pous() {
+    const pous = [];
+    const user = (kind, list, className, variables) => {
+      for (const pou of list) pous.push({ kind, name: pou.name, place: placeOf(pou), variables: variables(pou, className(pou)) });
+    };
+    user('program', this.ast.programs, (pou) => `Program_${pou.name}`, (pou, name) => [...this.declared(pou, name), ...this.reached(pou)]);
+    user('function_block', this.ast.functionBlocks, (pou) => pou.name, (pou) => this.blockVariables(pou));
+    user('function', this.ast.functions, (pou) => pou.name, (pou) => this.reached(pou));
+    for (const name of this.classes.keys()) {
+      if (this.isBlock(name) && !this.blocks.has(name)) pous.push({ kind: 'function_block', name, place: [-1, 0, 0], variables: this.libraryVariables(name) });
+    }
+    return pous;
+  }
+
+  typeList() {
+    const strip = (key, value) => (key === 'sourceSpan' || key === 'parent' || key === 'resolvedType' ? undefined : value);
+    return this.ast.types.map((type) => ({ name: type.name, definition: JSON.stringify(type.definition, strip), place: placeOf(type) }));
+  }
+
+  configurations() {
+    return this.ast.configurations.map((configuration) => ({
+      name: nameAsWritten(configuration, 'CONFIGURATION'),
+      place: placeOf(configuration),
+      globals: this.globals.found,
+      resources: configuration.resources.map((resource) => ({
+        name: nameAsWritten(resource, 'RESOURCE'),
+        place: placeOf(resource),
+        tasks: resource.tasks.map((task) => this.task(task)),
+        programs: resource.programInstances.map((program) => ({
+          name: nameAsWritten(program, 'PROGRAM'),
+          type: program.programType,
+          task: program.taskName ?? '',
+          place: placeOf(program),
+        })),
+      })),
+    }));
+  }
+  task(task) {
+    const text = (key) => {
+      const value = task.properties.get(key);
+      if (value === undefined) return '';
+      if (value.kind === 'VariableExpression') return [value.name, ...value.fieldAccess].join('.');
+      return value.kind === 'LiteralExpression' ? String(value.rawValue) : '?';
+    };
+    return { name: nameAsWritten(task, 'TASK'), interval: text('INTERVAL'), single: text('SINGLE'), priority: text('PRIORITY'), place: placeOf(task) };
+  }
+}
+
+const result = translate();
+const plan = {
+  format: 1,
+  problems: result.success ? [] : result.errors.slice(0, kMostMessages).map(message),
+  remarks: [],
+  files: [],
+  pous: [],
+  types: [],
+  configurations: [],
+};
+if (!result.success && plan.problems.length === 0) plan.problems.push({ place: [-1, 0, 0], text: 'STruC++ has failed, and has not said why' });
+if (result.success) {
+  const found = new Plan(result);
+  plan.pous = found.pous();
+  plan.types = found.typeList();
+  plan.configurations = found.configurations();
+  // Its task for a program without one is not used.
+  const warnings = result.warnings.filter((warning) => !warning.message.includes('has no task assignment'));
+  plan.remarks = [...warnings.map(message), ...found.remarks].slice(0, kMostMessages);
+  for (const file of result.cppFiles) {
+    writeFileSync(file.name, file.content, { flag: 'wx' });
+    plan.files.push(file.name);
+  }
+  writeFileSync('generated.hpp', result.headerCode, { flag: 'wx' });
+  writeFileSync('debug_table.cpp', result.debugTableCpp ?? '', { flag: 'wx' });
+  writeFileSync('debug_map.json', JSON.stringify(result.debugMap ?? {}), { flag: 'wx' });
+}
+writeFileSync('plan.json', JSON.stringify(plan), { flag: 'wx' });

@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "instances/adapters/strucpp/compiler.hpp"
+#include "instances/adapters/strucpp/glue.hpp"
+#include "instances/adapters/strucpp/plan_file.hpp"
+#include "instances/adapters/translator.hpp"
+
+namespace plchost {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Its name for the compiler, which writes it between quotes into C++ as it is. Else a neutral one.
+std::string name_for_compiler(const std::string& file, std::size_t number) {
+  const std::string path = fs::absolute(file);
+  const bool is_plain = std::ranges::all_of(
+      path, [](char c) { return c >= ' ' && c <= '~' && c != '"' && c != '\\' && c != '?'; });
+  return is_plain ? path : fmt::format("source_{}.st", number);
+}
+
+class StrucppTranslator : public Translator {
+ public:
+  explicit StrucppTranslator(BuildContext& context) : context_(context) {}
+
+  [[nodiscard]] iec::Compiler compiler() const noexcept override { return iec::Compiler::strucpp; }
+
+  // The compiler reads the declarations, too, so all of its work is done here.
+  bool read() override {
+    auto compiler = strucpp::find_compiler(context_.order.strucpp);
+    if (!context_.has(compiler) || !context_.open_folder()) return false;
+    compiler_ = *std::move(compiler);
+    if (!write_order() || !run()) return false;
+    const auto text = context_.folder().read("plan.json");
+    if (!context_.has(text)) return false;
+    std::vector<std::string> files;
+    for (const iec::Source& source : context_.sources) files.push_back(source.file);
+    auto plan = strucpp::read_plan(*text, files);
+    if (!context_.has(plan)) return false;
+    if (!plan->problems.empty()) explain();
+    std::ranges::move(plan->problems, std::back_inserter(context_.report.problems));
+    std::ranges::move(plan->remarks, std::back_inserter(context_.report.remarks));
+    context_.project = std::move(plan->project);
+    files_ = std::move(plan->files);
+    return context_.good();
+  }
+
+  bool translate() override {
+    auto c = context_.words_of("CC", "cc");
+    auto cpp = context_.words_of("CXX", "c++");
+    if (!c || !cpp) return false;
+    words_ = *std::move(cpp);
+    find_flags();
+    const std::string adapters = context_.adapters();
+    return context_.compile("the C compiler", *std::move(c),
+                            {.kind = CompileOrder::Kind::c_objects,
+                             .sources = context_.application_files(),
+                             .folders = {adapters, adapters + "/application"},
+                             .output = ""});
+  }
+
+  [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
+    return strucpp::write_glue(context_.project, context_.project.configurations.front(), resource, files_);
+  }
+
+  bool compile(const std::string& name, const std::string& glue, const fs::path& made) override {
+    const std::string file = name + ".cpp";
+    if (!context_.has(context_.folder().write(file, glue))) return false;
+    const std::string adapters = context_.adapters();
+    return context_.compile("the C++ compiler", words_,
+                            {.kind = CompileOrder::Kind::cpp_application,
+                             .sources = {file, "application.o", "places.o", "variables.o"},
+                             .folders = {adapters + "/application", adapters + "/strucpp", compiler_.headers,
+                                         context_.folder().path()},
+                             .output = made,
+                             .flags = flags_});
+  }
+
+ private:
+  // An online change allows no symbol that exists once in a process. Only g++ makes such, and has this flag.
+  void find_flags() {
+    const std::string flag = "-fno-gnu-unique";
+    std::vector<std::string> probe = words_;
+    probe.insert(probe.end(), {flag, "-fsyntax-only", "-x", "c++", "/dev/null"});
+    const auto end = run_program(probe, context_.folder().path(), {.time = context_.order.translate_limit});
+    if (end && end->success()) flags_.push_back(flag);
+  }
+
+  bool write_order() {
+    nlohmann::json list = nlohmann::json::array();
+    for (std::size_t i = 0; i < context_.sources.size(); ++i) {
+      const iec::Source& source = context_.sources[i];
+      list.push_back({{"name", name_for_compiler(source.file, i)}, {"text", source.text}});
+    }
+    // A byte that is no UTF-8 becomes a sign that the compiler refuses, unless it stands in a comment.
+    const std::string text = nlohmann::json{{"sources", std::move(list)}}.dump(
+        -1, ' ', false, nlohmann::json::error_handler_t::replace);
+    return context_.has(context_.folder().write("order.json", text));
+  }
+
+  bool run() {
+    const auto end = context_.run("node (Node.js, which STruC++ needs)",
+                                  {"node", context_.adapters() + "/strucpp/translate.mjs", compiler_.folder},
+                                  context_.order.translate_limit);
+    if (!end) return false;
+    if (end->signal != 0) {
+      context_.fail(fmt::format("STruC++ was ended by SIG{}", ::sigabbrev_np(end->signal)));
+    } else if (end->exit_code != 0) {
+      context_.fail("STruC++ has failed:" + first_lines(end->output));
+    }
+    return context_.good() && context_.has(context_.folder().check_room());
+  }
+
+  // Of some things of the language it says only that another word was expected.
+  void explain() {
+    for (const iec::Configuration& configuration :
+         iec::read_project(context_.sources).project.configurations) {
+      for (const iec::Resource& resource : configuration.resources) {
+        for (const iec::Variable& global : resource.globals) {
+          context_.fail(
+              {global.place, fmt::format("{}: STruC++ knows no VAR_GLOBAL in a RESOURCE; declare it "
+                                         "in the CONFIGURATION",
+                                         global.name)});
+        }
+        for (const iec::Program& program : resource.programs) {
+          if (!program.connected) continue;
+          context_.fail({program.place, fmt::format("PROGRAM {}: STruC++ cannot translate connections in "
+                                                    "parentheses; use VAR_EXTERNAL in {}",
+                                                    program.name, program.type)});
+        }
+      }
+    }
+  }
+
+  BuildContext& context_;
+  strucpp::Compiler compiler_;
+  std::vector<std::string> files_;
+  std::vector<std::string> words_;
+  std::vector<std::string> flags_;
+};
+
+}  // namespace
+
+std::unique_ptr<Translator> make_strucpp_translator(BuildContext& context) {
+  return std::make_unique<StrucppTranslator>(context);
+}
+
+}  // namespace plchost

@@ -1,0 +1,171 @@
+#include "instances/io/modbus/client/device.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "instances/io/modbus/threads/poll_schedule.hpp"
+#include "shm/log/log.hpp"
+
+namespace plchost::modbus {
+
+namespace {
+
+// So that the outputs of several maps get their safe state in the time that the end of the process has.
+constexpr std::chrono::milliseconds kSafeStateTimeout{300};
+
+}  // namespace
+
+Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images, const StopEvent& stop)
+    : config_(config), link_(link), stop_(stop), status_image_(images.input(config.status_image)) {
+  for (const RegisterMap& map : config.reads) {
+    InputImage* const image = images.input(map.image);
+    inputs_.push_back({.map = &map, .image = image, .values = {}});
+    if (std::ranges::find(input_images_, image) == input_images_.end()) input_images_.push_back(image);
+  }
+  for (const RegisterMap& map : config.writes) {
+    outputs_.push_back({.map = &map, .image = images.output(map.image), .written = {}, .written_at = {}});
+  }
+}
+
+void Device::run() {
+  PollSchedule schedule(config_.poll, config_.reconnect, config_.reconnect_max, MonotonicClock::now());
+  while (!stop_.wait_until(schedule.next())) {
+    poll();
+    if (quality_ == Quality::lost) {
+      schedule.failed(MonotonicClock::now());
+    } else {
+      schedule.answered(MonotonicClock::now());
+    }
+  }
+  make_safe();
+  if (schedule.skipped() != 0) {
+    spdlog::info("device '{}': {} polls were skipped because the one before took too long", config_.name,
+                 schedule.skipped());
+  }
+}
+
+void Device::poll() {
+  asked_ = !inputs_.empty();
+  const LinkResult written = write_outputs();
+  if (!asked_) return;  // nothing was due, so nothing is known
+  const bool is_there = written || written.error().exception != 0;
+  const LinkResult read = is_there ? read_inputs() : written;
+  end_poll(written, read);
+}
+
+// A refused map does not keep the others from being written.
+LinkResult Device::write_outputs() {
+  LinkResult result;
+  for (Output& output : outputs_) {
+    const LinkResult written = write_output(output);
+    if (written) continue;
+    result = written;
+    if (written.error().exception == 0) break;
+  }
+  return result;
+}
+
+LinkResult Device::write_output(Output& output) {
+  MapValues values;
+  const bool wanted = outputs_of(output, values);
+  const TimePoint now = MonotonicClock::now();
+  const bool due = !output.is_written || values != output.written ||
+                   (output.map->rewrite > Duration::zero() && now - output.written_at >= output.map->rewrite);
+  if (!wanted || !due) return {};
+  asked_ = true;
+  auto result = link_.write(config_, *output.map, values, config_.timeout);
+  output.is_written = result.has_value();
+  output.written = values;
+  output.written_at = now;
+  return result;
+}
+
+// False: nothing is to be written.
+bool Device::outputs_of(const Output& output, MapValues& values) const {
+  bool wanted = true;
+  output.image->look([&](std::span<const std::byte> bytes, Duration age) {
+    if (age < config_.silent_after) return values.read_from(*output.map, bytes);
+    wanted = config_.when_silent == LossPolicy::zero;
+  });
+  return wanted;
+}
+
+LinkResult Device::read_inputs() {
+  for (Input& input : inputs_) {
+    if (auto read = link_.read(config_, *input.map, input.values); !read) return read;
+  }
+  return {};
+}
+
+void Device::publish_inputs(TimePoint now) {
+  for (InputImage* const image : input_images_) {
+    image->update([&](std::span<std::byte> bytes) {
+      for (Input& input : inputs_) {
+        if (input.image == image) input.values.write_to(*input.map, bytes);
+      }
+      show(*image, bytes, now);
+    });
+  }
+}
+
+void Device::end_poll(const LinkResult& written, const LinkResult& read) {
+  const LinkFailure* const failure = !read ? &read.error() : !written ? &written.error() : nullptr;
+  const std::uint16_t exception = failure == nullptr ? std::uint16_t{0} : failure->exception;
+  quality_ = failure == nullptr ? Quality::good : exception != 0 ? Quality::exception : Quality::lost;
+  if (quality_ == Quality::lost) {
+    for (Output& output : outputs_) output.is_written = false;
+  }
+  const TimePoint now = MonotonicClock::now();
+  state_.polled(quality_, exception);
+  if (read) {
+    state_.read(now);
+    publish_inputs(now);
+  }
+  report(failure);
+}
+
+// Once for each change, and at most once a second.
+void Device::report(const LinkFailure* failure) {
+  if (quality_ == told_ || !log_pause_.is_over(MonotonicClock::now())) return;
+  told_ = quality_;
+  if (failure == nullptr) {
+    spdlog::info("device '{}' answers", config_.name);
+  } else if (failure->exception != 0) {
+    spdlog::warn("device '{}' refuses a request with exception {}: {}", config_.name, failure->exception,
+                 failure->text);
+  } else {
+    spdlog::warn("device '{}' is lost: {}", config_.name, failure->text);
+  }
+}
+
+void Device::make_safe() {
+  const bool answers = quality_ == Quality::good || quality_ == Quality::exception;
+  if (config_.when_silent != LossPolicy::zero || !answers) return;
+  for (const Output& output : outputs_) {
+    MapValues zeros;
+    const Duration timeout = std::min(config_.timeout, Duration(kSafeStateTimeout));
+    if (!link_.write(config_, *output.map, zeros, timeout)) {
+      spdlog::warn("device '{}': its outputs from address {} were not set to zero", config_.name,
+                   output.map->address);
+      return;
+    }
+  }
+}
+
+void Device::show(const InputImage& image, std::span<std::byte> bytes, TimePoint now, bool ended) const {
+  if (config_.when_gone == LossPolicy::zero && (ended || state_.is_older(now, config_.gone_after))) {
+    for (const Input& input : inputs_) {
+      if (input.image == &image) put_zeros(*input.map, bytes);
+    }
+  }
+  if (status_image_ != &image) return;
+  DeviceStatus status = state_.status(now);
+  if (ended)
+    status = {.quality = static_cast<std::uint16_t>(Quality::none), .exception = 0, .age_ms = kNeverRead};
+  std::memcpy(bytes.data() + config_.status_offset, &status, sizeof status);
+}
+
+}  // namespace plchost::modbus

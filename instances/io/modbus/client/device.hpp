@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/io/modbus/client/device_state.hpp"
+#include "instances/io/modbus/client/link.hpp"
+#include "instances/io/modbus/config/map_values.hpp"
+#include "instances/io/modbus/config/modbus_config.hpp"
+#include "instances/io/modbus/images/image_table.hpp"
+#include "instances/io/modbus/threads/log_pause.hpp"
+#include "instances/io/modbus/threads/stop_event.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost::modbus {
+
+/// One device: writes the outputs of a PLC to it, and its inputs into images. A poll puts all inputs into the
+/// images, or none.
+class Device {
+ public:
+  /// The images are those of the configuration.
+  Device(const DeviceConfig& config, Link& link, const ImageTable& images, const StopEvent& stop);
+
+  [[nodiscard]] const std::string& name() const noexcept { return config_.name; }
+  /// Its thread: polls until the stop, then puts the outputs into their safe state.
+  void run();
+  /// One poll; run() does it. The thread of run() only, or no thread runs.
+  void poll();
+  /// Of the last poll.
+  [[nodiscard]] Quality quality() const noexcept { return quality_; }
+
+  /// Puts the status into the bytes of an image, and zeros for inputs that are too old if so configured. Any
+  /// thread, within the update of that image. `ended`: the device is polled no more.
+  void show(const InputImage& image, std::span<std::byte> bytes, TimePoint now, bool ended = false) const;
+
+ private:
+  struct Input {
+    const RegisterMap* map;
+    InputImage* image;
+    MapValues values;
+  };
+  struct Output {
+    const RegisterMap* map;
+    OutputImage* image;
+    MapValues written;
+    bool is_written = false;  ///< since the connection was made
+    TimePoint written_at;
+  };
+
+  [[nodiscard]] LinkResult write_outputs();
+  [[nodiscard]] LinkResult write_output(Output& output);
+  [[nodiscard]] bool outputs_of(const Output& output, MapValues& values) const;
+  [[nodiscard]] LinkResult read_inputs();
+  void publish_inputs(TimePoint now);
+  void make_safe();
+  void end_poll(const LinkResult& written, const LinkResult& read);
+  void report(const LinkFailure* failure);
+
+  const DeviceConfig& config_;
+  Link& link_;
+  const StopEvent& stop_;
+  InputImage* status_image_;
+  std::vector<Input> inputs_;
+  std::vector<InputImage*> input_images_;  ///< of inputs_, each once
+  std::vector<Output> outputs_;
+  DeviceState state_;
+  bool asked_ = false;               ///< the poll has something to ask
+  Quality quality_ = Quality::none;  ///< of the last poll
+  Quality told_ = Quality::none;     ///< in the log
+  LogPause log_pause_;
+};
+
+}  // namespace plchost::modbus

@@ -1,0 +1,25 @@
+#include "instances/io/modbus/images/input_image.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace plchost::modbus {
+
+Result<std::unique_ptr<InputImage>> InputImage::open(const std::string& pool, const std::string& name,
+                                                     std::uint32_t size) {
+  PLCHOST_TRY_ASSIGN(auto image, ProcessImage::open(pool, name, size, PLC_IMAGE_WRITE));
+  std::unique_ptr<InputImage> opened(new InputImage(pool, name, std::move(image)));
+  if (!opened->image_.read(opened->bytes_)) std::ranges::fill(opened->bytes_, std::byte{0});
+  return opened;
+}
+
+Result<void> InputImage::repair() {
+  const std::lock_guard lock(mutex_);
+  if (!image_.gone()) return {};
+  const auto size = static_cast<std::uint32_t>(bytes_.size());
+  PLCHOST_TRY_ASSIGN(image_, ProcessImage::open(pool_, name_, size, PLC_IMAGE_WRITE));
+  plc_image_write(&image_.image(), bytes_.data());
+  return {};
+}
+
+}  // namespace plchost::modbus

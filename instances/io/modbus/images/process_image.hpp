@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "shm/base/memory_guard.hpp"
+#include "shm/base/result.hpp"
+#include "shm/plc_process_image.h"
+
+namespace plchost::modbus {
+
+/// One opened image of the pool, also if its file is removed or cut short by others. Not for several threads.
+class ProcessImage {
+ public:
+  /// `access`: PLC_IMAGE_READ or PLC_IMAGE_WRITE. busy: another process writes it. Set-up.
+  [[nodiscard]] static Result<ProcessImage> open(const std::string& pool, const std::string& name,
+                                                 std::uint32_t size, int access);
+  ProcessImage(ProcessImage&& other) noexcept;
+  ProcessImage& operator=(ProcessImage&& other) noexcept;
+  ProcessImage(const ProcessImage&) = delete;
+  ProcessImage& operator=(const ProcessImage&) = delete;
+  ~ProcessImage();
+
+  /// The name leads to another file, or to none, or the file was cut short: open it anew.
+  [[nodiscard]] bool gone() const;
+  [[nodiscard]] const plc_image& image() const noexcept { return image_; }
+  /// The latest image, and when it was published. Nothing: none yet, or it was overtaken each time.
+  [[nodiscard]] std::optional<plc_image_i64> read(std::span<std::byte> bytes) const noexcept;
+
+ private:
+  ProcessImage(std::string pool, std::string name, const plc_image& image);
+  std::string pool_;
+  std::string name_;
+  plc_image image_{};
+  MemoryGuard guard_;
+};
+
+}  // namespace plchost::modbus

@@ -1,0 +1,119 @@
+#include "instances/io/modbus/modbus_process.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include "shm/log/log.hpp"
+
+namespace plchost::modbus {
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kShow{50};          // how fine the ages are
+constexpr milliseconds kRepairPause{500};  // images whose file was removed
+// Together below a second. At first a device that answers puts its outputs into their safe state; a thread
+// that still waits then is interrupted.
+constexpr milliseconds kSafeStateTime{600};
+constexpr milliseconds kInterruptTime{250};
+
+}  // namespace
+
+Result<std::unique_ptr<ModbusProcess>> ModbusProcess::create(const ModbusConfig& config) {
+  PLCHOST_TRY_ASSIGN(auto stop, StopEvent::make());
+  PLCHOST_TRY_ASSIGN(auto images, ImageTable::open(config.process.pool, config.images));
+  std::unique_ptr<ModbusProcess> process(new ModbusProcess(config, std::move(stop), std::move(images)));
+  PLCHOST_TRY(process->add_devices());
+  if (config.server) {
+    PLCHOST_TRY_ASSIGN(process->server_, Server::listen(*config.server, process->images_, process->stop_));
+  }
+  return process;
+}
+
+ModbusProcess::~ModbusProcess() {
+  if (!threads_.empty()) (void)stop();
+}
+
+Result<void> ModbusProcess::add_devices() {
+  for (const DeviceConfig& device : config_.devices) {
+    auto& line = lines_[device.serial.empty() ? "tcp " + device.name : device.serial];
+    if (!line) {
+      PLCHOST_TRY_ASSIGN(line, Link::make(device, stop_));
+    }
+    devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
+  }
+  return {};
+}
+
+Result<void> ModbusProcess::start_threads() {
+  for (const auto& device : devices_) {
+    PLCHOST_TRY_ASSIGN(auto thread, Thread::start(device->name(), {}, [&device] { device->run(); }));
+    threads_.push_back(std::move(thread));
+  }
+  if (server_) {
+    PLCHOST_TRY_ASSIGN(auto thread, Thread::start("server", {}, [this] { server_->run(); }));
+    threads_.push_back(std::move(thread));
+    spdlog::info("the server listens at {}", config_.server->listen);
+  }
+  return {};
+}
+
+Result<void> ModbusProcess::run(int signals) {
+  show(MonotonicClock::now(), false);  // the first status of each device, before it is polled
+  PLCHOST_TRY(start_threads());
+  spdlog::info("{} devices, {} images", devices_.size(), config_.images.size());
+  pollfd signal{.fd = signals, .events = POLLIN, .revents = 0};
+  while (::poll(&signal, 1, static_cast<int>(kShow.count())) == 0 || errno == EINTR) {
+    if (signal.revents != 0) break;
+    const TimePoint now = MonotonicClock::now();
+    show(now, false);
+    repair(now);
+  }
+  spdlog::info("a signal asks for the end");
+  return {};
+}
+
+bool ModbusProcess::join_until(TimePoint deadline) {
+  bool ended = true;
+  for (Thread& thread : threads_) ended = thread.join_until(deadline, [] { return false; }) && ended;
+  return ended;
+}
+
+bool ModbusProcess::stop() {
+  stop_.set();
+  const TimePoint now = MonotonicClock::now();
+  bool ended = join_until(now + kSafeStateTime);
+  if (!ended) {
+    for (const auto& [name, line] : lines_) line->interrupt();
+    ended = join_until(now + kSafeStateTime + kInterruptTime);
+  }
+  show(MonotonicClock::now(), true);
+  if (ended) threads_.clear();
+  return ended;
+}
+
+void ModbusProcess::show(TimePoint now, bool ended) {
+  for (const auto& [name, image] : images_.inputs()) {
+    image->update([&](std::span<std::byte> bytes) {
+      for (const auto& device : devices_) device->show(*image, bytes, now, ended);
+    });
+  }
+}
+
+void ModbusProcess::repair(TimePoint now) {
+  if (now < repaired_at_ + kRepairPause) return;
+  repaired_at_ = now;
+  for (const auto& [name, image] : images_.inputs()) {
+    const auto repaired = image->repair();
+    if (!repaired && repair_pause_.is_over(now)) spdlog::error("{}", repaired.error().describe());
+  }
+}
+
+}  // namespace plchost::modbus

@@ -1,0 +1,378 @@
+#include "shm/variables/variable_type.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <concepts>
+#include <cstdlib>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <type_traits>
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+#include "shm/variables/time_text.hpp"
+#include "shm/variables/variable_symbol.hpp"
+
+namespace plchost {
+
+namespace {
+
+using enum VariableType;
+
+// In the order of their numbers, from 1.
+constexpr std::array<VariableTypeTraits, 25> kTypes{{{bool_, "BOOL", 1},
+                                                     {sint, "SINT", 1},
+                                                     {int_, "INT", 2},
+                                                     {dint, "DINT", 4},
+                                                     {lint, "LINT", 8},
+                                                     {usint, "USINT", 1},
+                                                     {uint, "UINT", 2},
+                                                     {udint, "UDINT", 4},
+                                                     {ulint, "ULINT", 8},
+                                                     {byte, "BYTE", 1},
+                                                     {word, "WORD", 2},
+                                                     {dword, "DWORD", 4},
+                                                     {lword, "LWORD", 8},
+                                                     {real, "REAL", 4},
+                                                     {lreal, "LREAL", 8},
+                                                     {time, "TIME", 8},
+                                                     {date, "DATE", 8},
+                                                     {time_of_day, "TOD", 8},
+                                                     {date_and_time, "DT", 8},
+                                                     {string, "STRING", 0},
+                                                     {timespec_time, "TIME", 16},
+                                                     {timespec_date, "DATE", 16},
+                                                     {timespec_time_of_day, "TOD", 16},
+                                                     {timespec_date_and_time, "DT", 16},
+                                                     {counted_string, "STRING", 0}}};
+constexpr std::int64_t kPerSecond = 1'000'000'000;
+constexpr std::size_t kMaxCounted = 255;
+
+std::unexpected<Error> not_allowed(std::string_view text, std::string_view allowed) {
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is not allowed here; allowed is {}", shown(text), allowed));
+}
+
+std::unexpected<Error> not_of(VariableType type, std::string_view text, std::string_view allowed) {
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is no {}; allowed is {}", shown(text), traits_of(type).name, allowed));
+}
+
+template <class Value>
+Value load(std::span<const std::byte> bytes) noexcept {
+  Value value{};
+  std::memcpy(&value, bytes.data(), sizeof value);
+  return value;
+}
+
+template <class Value>
+void store(std::span<std::byte> bytes, Value value) noexcept {
+  std::memcpy(bytes.data(), &value, sizeof value);
+}
+
+/// Calls `with` with a value of the C++ type that an integer or bit string has.
+template <class With>
+auto with_integer(VariableType type, With with) {
+  const bool has_sign = type >= sint && type <= lint;
+  switch (traits_of(type).bytes) {
+    case 1:
+      return has_sign ? with(std::int8_t{}) : with(std::uint8_t{});
+    case 2:
+      return has_sign ? with(std::int16_t{}) : with(std::uint16_t{});
+    case 4:
+      return has_sign ? with(std::int32_t{}) : with(std::uint32_t{});
+    default:
+      return has_sign ? with(std::int64_t{}) : with(std::uint64_t{});
+  }
+}
+
+bool is_bit_string(VariableType type) noexcept {
+  return type >= byte && type <= lword;
+}
+
+/// For types of time; nothing: of another type.
+std::optional<TimeForm> form_of(VariableType type) noexcept {
+  if (type >= time && type <= date_and_time)
+    return static_cast<TimeForm>(std::to_underlying(type) - std::to_underlying(time));
+  if (type >= timespec_time && type <= timespec_date_and_time)
+    return static_cast<TimeForm>(std::to_underlying(type) - std::to_underlying(timespec_time));
+  return std::nullopt;
+}
+
+// ---- to text
+
+template <class Value>
+std::string real_text(Value value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".n") != std::string::npos) return text;  // also nan, inf
+  text.insert(std::min(text.find('e'), text.size()), ".0");
+  return text;
+}
+
+std::string timespec_text(TimeForm form, std::int64_t seconds, std::int64_t nanoseconds) {
+  std::int64_t sum = 0;
+  if (__builtin_mul_overflow(seconds, kPerSecond, &sum) || __builtin_add_overflow(sum, nanoseconds, &sum))
+    return fmt::format("{} s {} ns", seconds, nanoseconds);
+  return time_text(form, sum);
+}
+
+/// The characters that a string's memory holds.
+std::string_view characters_of(VariableType type, std::span<const std::byte> value) noexcept {
+  const auto* const bytes = reinterpret_cast<const char*>(value.data());
+  if (value.empty()) return {};
+  if (type == counted_string)
+    return {bytes + 1, std::min<std::size_t>(std::to_integer<std::size_t>(value[0]), value.size() - 1)};
+  return {bytes, static_cast<std::size_t>(std::find(bytes, bytes + value.size(), '\0') - bytes)};
+}
+
+bool is_control(char c) noexcept {
+  constexpr char kDelete = 0x7f;
+  return (static_cast<unsigned char>(c) < ' ') || c == kDelete;
+}
+
+std::string string_text(std::string_view characters) {
+  std::string plain(characters);
+  std::ranges::replace_if(plain, is_control, ' ');
+  const bool utf8 = is_printable_utf8(plain);
+  std::string text = "'";
+  for (const char c : characters) {
+    const bool high = (static_cast<unsigned char>(c) & 0x80U) != 0;
+    if (is_control(c) || (high && !utf8)) {
+      fmt::format_to(std::back_inserter(text), "${:02X}", static_cast<unsigned char>(c));
+    } else {
+      if (c == '$' || c == '\'') text += '$';
+      text += c;
+    }
+  }
+  return text + '\'';
+}
+
+std::string whole_text(VariableType type, std::span<const std::byte> value) {
+  if (is_string(type)) return string_text(characters_of(type, value));
+  if (value.size() < traits_of(type).bytes) return {};
+  if (type == bool_) return value[0] == std::byte{0} ? "FALSE" : "TRUE";
+  if (type == real) return real_text(load<float>(value));
+  if (type == lreal) return real_text(load<double>(value));
+  if (const auto form = form_of(type)) {
+    if (type < timespec_time) return time_text(*form, load<std::int64_t>(value));
+    return timespec_text(*form, load<std::int64_t>(value), load<std::int64_t>(value.subspan(8)));
+  }
+  return with_integer(type, [&]<class Value>(Value) {
+    const auto number = load<Value>(value);
+    return is_bit_string(type) ? fmt::format("16#{:0{}X}", number, 2 * sizeof number)
+                               : fmt::format("{}", number);
+  });
+}
+
+// ---- from text
+
+/// The rest of "PREFIX#rest", for a prefix that a literal of the type can have; else the text.
+std::string_view without_prefix(VariableType type, std::string_view text) {
+  const std::size_t sharp = text.find('#');
+  if (sharp == std::string_view::npos) return text;
+  struct Names {
+    std::string_view type;
+    std::array<std::string_view, 4> prefixes;
+  };
+  constexpr std::array<Names, 4> kPrefixes{{{"TIME", {"T", "TIME", "LT", "LTIME"}},
+                                            {"DATE", {"D", "DATE", "LD", "LDATE"}},
+                                            {"TOD", {"TOD", "TIME_OF_DAY", "LTOD", "LTIME_OF_DAY"}},
+                                            {"DT", {"DT", "DATE_AND_TIME", "LDT", "LDATE_AND_TIME"}}}};
+  const std::string_view name = traits_of(type).name;
+  const std::string_view prefix = text.substr(0, sharp);
+  bool known = same_variable_name(prefix, name);
+  for (const Names& names : kPrefixes) {
+    known = known || (names.type == name && std::ranges::any_of(names.prefixes, [&](std::string_view each) {
+                        return same_variable_name(prefix, each);
+                      }));
+  }
+  return known ? text.substr(sharp + 1) : text;
+}
+
+/// Digits without the _ between them; nothing: there is a _ that is not between two.
+std::optional<std::string> plain_digits(std::string_view text) {
+  std::string digits;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '_') {
+      digits += text[i];
+    } else if (i == 0 || i + 1 == text.size() || !std::isxdigit(static_cast<unsigned char>(text[i - 1])) ||
+               !std::isxdigit(static_cast<unsigned char>(text[i + 1]))) {
+      return std::nullopt;
+    }
+  }
+  return digits;
+}
+
+template <class Value>
+std::optional<Value> integer_of(std::string_view text) {
+  int base = 10;
+  const std::size_t sharp = text.find('#');
+  if (sharp != std::string_view::npos) {
+    const std::string_view name = text.substr(0, sharp);
+    base = name == "2" ? 2 : name == "8" ? 8 : name == "10" ? 10 : name == "16" ? 16 : 0;
+    text.remove_prefix(sharp + 1);
+    if (base == 0 || text.starts_with('-')) return std::nullopt;
+  } else if (text.size() > 1 && text.starts_with('+') && text[1] != '-') {
+    text.remove_prefix(1);
+  }
+  const auto digits = plain_digits(text);
+  if (!digits) return std::nullopt;
+  Value value{};
+  const auto [end, error] = std::from_chars(digits->data(), digits->data() + digits->size(), value, base);
+  if (error != std::errc() || end != digits->data() + digits->size()) return std::nullopt;
+  return value;
+}
+
+Result<void> parse_integer(VariableType type, std::string_view text, std::span<std::byte> value) {
+  return with_integer(type, [&]<class Value>(Value) -> Result<void> {
+    const auto number = integer_of<Value>(text);
+    if (number) {
+      store(value, *number);
+      return {};
+    }
+    using Limits = std::numeric_limits<Value>;
+    if (is_bit_string(type)) {
+      return not_of(type, text, fmt::format("0 to 16#{:X}, in base 10, 2#, 8# or 16#", Limits::max()));
+    }
+    return not_of(type, text,
+                  fmt::format("{} to {}, in base 10, 2#, 8# or 16#", Limits::min(), Limits::max()));
+  });
+}
+
+template <class Value>
+Result<void> parse_real(VariableType type, std::string_view text, std::span<std::byte> value) {
+  const auto digits = plain_digits(text.starts_with('+') ? text.substr(1) : text);
+  Value number{};
+  const char* const begin = digits ? digits->data() : nullptr;
+  const char* const end = digits ? begin + digits->size() : nullptr;
+  if (digits && !(text.starts_with('+') && digits->starts_with('-'))) {
+    const auto [stop, error] = std::from_chars(begin, end, number);
+    if (error == std::errc() && stop == end && begin != end) {
+      store(value, number);
+      return {};
+    }
+  }
+  return not_of(type, text,
+                fmt::format("1.5, -2.0e-3, nan, or up to {:.3g}", std::numeric_limits<Value>::max()));
+}
+
+Result<void> parse_bool(std::string_view text, std::span<std::byte> value) {
+  const bool on = text == "1" || same_variable_name(text, "TRUE");
+  if (!on && text != "0" && !same_variable_name(text, "FALSE"))
+    return not_of(bool_, text, "TRUE, FALSE, 1, 0");
+  value[0] = std::byte{on ? std::uint8_t{1} : std::uint8_t{0}};
+  return {};
+}
+
+Result<void> parse_moment(VariableType type, TimeForm form, std::string_view text,
+                          std::span<std::byte> value) {
+  PLCHOST_TRY_ASSIGN(const std::int64_t nanoseconds, parse_time(form, text));
+  if (type < timespec_time) {
+    store(value, nanoseconds);
+  } else {
+    const auto [seconds, rest] = std::lldiv(nanoseconds, kPerSecond);
+    store(value, std::int64_t{seconds});
+    store(value.subspan(8), std::int64_t{rest});
+  }
+  return {};
+}
+
+/// The character that stands behind a $; nothing: there is none. `text` goes on behind it.
+std::optional<char> take_escape(std::string_view& text) {
+  if (text.empty()) return std::nullopt;
+  constexpr std::string_view kNames = "$'LNPRT";
+  constexpr std::string_view kMeant = "$'\n\n\f\r\t";
+  const char upper = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (const std::size_t found = kNames.find(upper); found != std::string_view::npos) {
+    text.remove_prefix(1);
+    return kMeant[found];
+  }
+  unsigned code = 0;
+  constexpr int kHexadecimal = 16;
+  const std::string_view digits = text.substr(0, 2);
+  const auto parsed = std::from_chars(digits.begin(), digits.end(), code, kHexadecimal);
+  if (digits.size() < 2 || parsed.ptr != digits.end()) return std::nullopt;
+  text.remove_prefix(2);
+  return static_cast<char>(code);
+}
+
+/// The characters of a text in quotes.
+Result<std::string> unquoted(std::string_view text) {
+  constexpr std::string_view kAllowed =
+      "'text' with $$, $', $L, $N, $P, $R, $T or $ and two hexadecimal digits in it";
+  std::string_view rest = text.substr(1);
+  std::string characters;
+  while (!rest.empty() && rest.front() != '\'') {
+    const char c = rest.front();
+    rest.remove_prefix(1);
+    const auto meant = c == '$' ? take_escape(rest) : std::optional(c);
+    if (!meant) return not_allowed(text, kAllowed);
+    characters += *meant;
+  }
+  if (rest != "'") return not_allowed(text, kAllowed);
+  return characters;
+}
+
+Result<void> parse_string(VariableType type, std::string_view text, std::span<std::byte> value) {
+  if (const auto rest = without_prefix(type, text); rest.starts_with('\'')) text = rest;
+  std::string characters(text);
+  if (text.starts_with('\'')) {
+    PLCHOST_TRY_ASSIGN(characters, unquoted(text));
+  }
+  const bool counted = type == counted_string;
+  const std::size_t most =
+      std::min(value.empty() ? 0 : value.size() - 1, counted ? kMaxCounted : value.size());
+  if (characters.size() > most)
+    return not_allowed(text,
+                       fmt::format("a text of at most {} bytes; this one has {}", most, characters.size()));
+  if (value.empty()) return {};
+  if (!counted && characters.find('\0') != std::string::npos)
+    return not_allowed(text, "a text without $00, which ends a STRING");
+  std::ranges::fill(value, std::byte{0});
+  if (counted) value[0] = static_cast<std::byte>(characters.size());
+  std::memcpy(value.data() + (counted ? 1 : 0), characters.data(), characters.size());
+  return {};
+}
+
+}  // namespace
+
+std::span<const VariableTypeTraits> variable_types() noexcept {
+  return kTypes;
+}
+
+const VariableTypeTraits* find_variable_type(std::uint32_t number) noexcept {
+  return number >= 1 && number <= kTypes.size() ? &kTypes[number - 1] : nullptr;
+}
+
+const VariableTypeTraits& traits_of(VariableType type) noexcept {
+  return kTypes[static_cast<std::size_t>(std::to_underlying(type)) - 1];
+}
+
+bool is_string(VariableType type) noexcept {
+  return type == string || type == counted_string;
+}
+
+std::string variable_text(VariableType type, std::span<const std::byte> value, std::size_t most) {
+  std::string text = whole_text(type, value);
+  constexpr std::string_view kMore = "...";
+  if (text.size() <= most) return text;
+  return std::string(cut(text, most - std::min(most, kMore.size()))) + std::string(kMore.substr(0, most));
+}
+
+Result<void> parse_variable(VariableType type, std::string_view text, std::span<std::byte> value) {
+  if (is_string(type)) return parse_string(type, text, value);
+  if (value.size() != traits_of(type).bytes) {
+    return failure(ErrorCode::wrong_size, fmt::format("a {} has {} bytes and not {}", traits_of(type).name,
+                                                      traits_of(type).bytes, value.size()));
+  }
+  const std::string_view literal = without_prefix(type, text);
+  if (type == bool_) return parse_bool(literal, value);
+  if (type == real) return parse_real<float>(type, literal, value);
+  if (type == lreal) return parse_real<double>(type, literal, value);
+  if (const auto form = form_of(type)) return parse_moment(type, *form, literal, value);
+  return parse_integer(type, literal, value);
+}
+
+}  // namespace plchost

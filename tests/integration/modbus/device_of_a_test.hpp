@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "tests/integration/modbus/modbus_peer.hpp"
+#include "tests/integration/modbus/modbus_program.hpp"
+
+namespace plchost::testing {
+
+inline bool quality_is(const Plant& plant, unsigned offset, modbus::Quality quality) {
+  return plant.status(offset).quality == static_cast<std::uint16_t>(quality);
+}
+
+// A device with an input register at byte 0, an output register, and its status at byte 56.
+inline std::string device(const HeldPort& port, std::string_view more = "") {
+  return fmt::format(R"(
+[[device]]
+name = "valves"
+tcp = "{}"
+poll_ms = 10
+timeout_ms = 200
+reconnect_ms = 100
+reconnect_max_ms = 200
+gone_after_ms = 300
+status_image = "t.in"
+status_offset = 56
+{}
+[[device.read]]
+kind = "input_register"
+address = 100
+image = "t.in"
+[[device.write]]
+kind = "holding_register"
+address = 7
+count = 2
+image = "t.out"
+)",
+                     port.address(), more);
+}
+
+// The register that device() reads.
+inline void measure(ModbusPeer& peer, std::uint16_t value) {
+  peer.with([&](modbus_mapping_t& mapping) { mapping.tab_input_registers[100] = value; });
+}
+
+}  // namespace plchost::testing

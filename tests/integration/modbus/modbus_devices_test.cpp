@@ -1,0 +1,234 @@
+// plchost-modbus between images and real devices of libmodbus, which stall, vanish and answer garbage.
+
+#include <csignal>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "tests/integration/modbus/device_of_a_test.hpp"
+#include "tests/integration/modbus/modbus_peer.hpp"
+#include "tests/integration/modbus/modbus_program.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using modbus::Quality;
+using Mode = ModbusPeer::Mode;
+
+TEST(ModbusDevices, ExchangesAllKindsOfRegisters) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  peer.with([](modbus_mapping_t& mapping) {
+    mapping.tab_bits[3] = 1;
+    mapping.tab_input_bits[2] = 1;
+    mapping.tab_registers[10] = 0x1122;
+    mapping.tab_registers[11] = 0x3344;
+    mapping.tab_input_registers[0] = 4711;
+  });
+  const std::string text = fmt::format(R"(
+[[device]]
+name = "all"
+tcp = "{}"
+poll_ms = 10
+status_image = "t.in"
+status_offset = 48
+[[device.read]]
+kind = "coil"
+address = 0
+count = 10
+image = "t.in"
+[[device.read]]
+kind = "discrete_input"
+address = 2
+image = "t.in"
+offset = 2
+bit = 7
+[[device.read]]
+kind = "holding_register"
+address = 10
+count = 2
+image = "t.in"
+offset = 4
+order = "abcd"
+[[device.read]]
+kind = "input_register"
+address = 0
+image = "t.in"
+offset = 8
+[[device.write]]
+kind = "coil"
+address = 20
+count = 3
+image = "t.out"
+bit = 1
+[[device.write]]
+kind = "coil"
+address = 30
+image = "t.out"
+[[device.write]]
+kind = "holding_register"
+address = 40
+count = 2
+image = "t.out"
+[[device.write]]
+kind = "holding_register"
+address = 50
+image = "t.out"
+)",
+                                       port.address());
+  const ModbusProgram sut(plant, plant.write(text));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 48, Quality::good); })) << sut.log();
+  const auto inputs = plant.inputs();
+  EXPECT_EQ(inputs[0], 0x08);
+  EXPECT_EQ(inputs[2], 0x80);
+  EXPECT_EQ(plant.input_word(4), 0x3344);  // the low word of 0x11223344
+  EXPECT_EQ(plant.input_word(6), 0x1122);
+  EXPECT_EQ(plant.input_word(8), 4711);
+  EXPECT_TRUE(eventually([&] {
+    plant.put_out(0, 0x0105);
+    return peer.holding(40) == 0x0105 && peer.holding(50) == 0x0105;
+  }));
+  EXPECT_TRUE(eventually([&] {  // bits 1 to 3 of 0x05, and bit 0
+    plant.put_out(0, 0x0105);
+    return peer.coil(20) == 0 && peer.coil(21) == 1 && peer.coil(22) == 0 && peer.coil(30) == 1;
+  }));
+}
+
+TEST(ModbusDevices, ASilentPlcsOutputsBecomeZero) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 500")));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99;
+  })) << sut.log();
+  EXPECT_TRUE(eventually([&] { return peer.holding(7) == 0; }));  // nothing is put out any more
+}
+
+TEST(ModbusDevices, ASilentPlcsOutputsStayIfSo) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 200\nwhen_silent = \"keep\"")));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99;
+  })) << sut.log();
+  const int requests = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
+  EXPECT_EQ(peer.holding(7), 99);
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  EXPECT_EQ(peer.holding(7), 99);
+}
+
+TEST(ModbusDevices, ADeviceThatVanishesIsGoneAndComesBack) {
+  Plant plant;
+  const HeldPort port;
+  auto peer = std::make_unique<ModbusPeer>(port);
+  measure(*peer, 5);
+  const ModbusProgram sut(plant, plant.write(device(port, "when_gone = \"zero\"")));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good) && plant.input_word(0) == 5; }))
+      << sut.log();
+  peer.reset();
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost) && plant.input_word(0) == 0; }));
+  EXPECT_GE(plant.status(56).age_ms, 300);
+  EXPECT_TRUE(eventually([&] { return sut.logged("device 'valves' is lost"); }));
+  peer = std::make_unique<ModbusPeer>(port);
+  measure(*peer, 6);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good) && plant.input_word(0) == 6; }));
+  // The new device has forgotten the outputs: they are written again, although they have not changed.
+  EXPECT_TRUE(eventually([&] {
+    plant.put_out(0, 77);
+    return peer->holding(7) == 77;
+  }));
+}
+
+TEST(ModbusDevices, InputsOfALostDeviceStayWithTheirAge) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  measure(peer, 5);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(eventually([&] { return plant.input_word(0) == 5; })) << sut.log();
+  peer.set(Mode::stalls);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); }));
+  EXPECT_TRUE(eventually([&] { return plant.status(56).age_ms > 1000; }));
+  EXPECT_EQ(plant.input_word(0), 5);
+  peer.set(Mode::normal);
+  EXPECT_TRUE(
+      eventually([&] { return plant.status(56).age_ms < 1000 && quality_is(plant, 56, Quality::good); }));
+}
+
+TEST(ModbusDevices, GarbageIsALostDevice) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, Mode::garbage);
+  measure(peer, 5);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); })) << sut.log();
+  const int requests = peer.requests();
+  EXPECT_TRUE(eventually([&] { return peer.requests() > requests + 2; }));
+  EXPECT_EQ(plant.input_word(0), 0);
+  peer.set(Mode::normal);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good) && plant.input_word(0) == 5; }));
+}
+
+// A response that never ends is over with the response timeout, not with the last byte.
+TEST(ModbusDevices, AResponseThatNeverEndsIsALostDevice) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, Mode::dribbles);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); })) << sut.log();
+  peer.set(Mode::normal);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
+}
+
+TEST(ModbusDevices, TheExceptionOfADeviceIsShown) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, Mode::refuses);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::exception); })) << sut.log();
+  EXPECT_EQ(plant.status(56).exception, 2);
+  EXPECT_TRUE(
+      eventually([&] { return sut.logged("refuses a request with exception 2: Illegal data address"); }));
+  peer.set(Mode::normal);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
+  EXPECT_EQ(plant.status(56).exception, 0);
+}
+
+TEST(ModbusDevices, AStalledDeviceDelaysNoOther) {
+  Plant plant;
+  const HeldPort stalled_port;
+  const HeldPort port;
+  ModbusPeer stalled(stalled_port, Mode::stalls);
+  ModbusPeer peer(port);
+  const std::string other = fmt::format(R"(
+[[device]]
+name = "stalled"
+tcp = "{}"
+poll_ms = 10
+timeout_ms = 10000
+[[device.read]]
+kind = "coil"
+address = 0
+image = "t.in"
+offset = 40
+)",
+                                        stalled_port.address());
+  const ModbusProgram sut(plant, plant.write(other + device(port)));
+  ASSERT_TRUE(eventually([&] { return stalled.requests() == 1; })) << sut.log();
+  for (std::uint16_t value = 1; value <= 20; ++value) {
+    measure(peer, value);
+    ASSERT_TRUE(eventually([&] { return plant.input_word(0) == value; }));
+  }
+  EXPECT_EQ(stalled.requests(), 1);  // all the time it has waited for its answer
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include <modbus/modbus.h>
+
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost::testing {
+
+/// A port of the loopback interface that nobody else gets while this is there, also if nobody listens.
+class HeldPort {
+ public:
+  HeldPort();
+  [[nodiscard]] std::uint16_t number() const { return number_; }
+  [[nodiscard]] std::string address() const;
+
+ private:
+  UniqueFd fd_;
+  std::uint16_t number_ = 0;
+};
+
+/// Two ends of a serial line: a terminal of the kernel that programs open, and the other end.
+class SerialLine {
+ public:
+  SerialLine();
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] int other_end() const { return master_.get(); }
+
+ private:
+  UniqueFd master_;
+  UniqueFd held_;  ///< else the line would hang up when its last user closes it
+  std::string path_;
+};
+
+/// A Modbus device made with libmodbus, in a thread of its own. It has kRegisters of each kind, which begin
+/// as zero.
+class ModbusPeer {
+ public:
+  static constexpr int kRegisters = 300;
+  enum class Mode : int {
+    normal,
+    stalls,    ///< takes requests, and does not answer
+    garbage,   ///< answers with bytes that are no Modbus
+    dribbles,  ///< answers one byte of a response after the other, and never ends
+    refuses,   ///< answers with exception 2
+    echoes,    ///< normal, and its input registers follow its holding registers
+  };
+
+  /// On TCP.
+  explicit ModbusPeer(const HeldPort& port, Mode mode = Mode::normal);
+  /// On a serial line, with this unit.
+  ModbusPeer(const SerialLine& line, int unit);
+  /// Connections end, and nobody listens any more.
+  ~ModbusPeer();
+  ModbusPeer(const ModbusPeer&) = delete;
+  ModbusPeer& operator=(const ModbusPeer&) = delete;
+
+  void set(Mode mode) { mode_ = mode; }
+  /// Calls `use` while no request is answered.
+  void with(const std::function<void(modbus_mapping_t&)>& use);
+  [[nodiscard]] int holding(int address);
+  [[nodiscard]] int coil(int address);
+  /// That it was sent so far.
+  [[nodiscard]] int requests() const { return requests_; }
+
+ private:
+  void run();
+  void run_line();
+  [[nodiscard]] bool serve(int fd);
+  void make_mapping();
+
+  modbus_t* context_ = nullptr;
+  modbus_mapping_t* mapping_ = nullptr;
+  std::mutex mutex_;
+  std::atomic<Mode> mode_;
+  std::atomic<int> requests_{0};
+  std::atomic<bool> ends_{false};
+  UniqueFd listener_;
+  int line_ = -1;
+  int unit_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace plchost::testing

@@ -1,0 +1,119 @@
+// The process: its end, its images and its file.
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "tests/integration/modbus/device_of_a_test.hpp"
+#include "tests/integration/modbus/modbus_peer.hpp"
+#include "tests/integration/modbus/modbus_program.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using modbus::Quality;
+using ::testing::HasSubstr;
+using Mode = ModbusPeer::Mode;
+using namespace std::chrono_literals;
+
+TEST(ModbusProcess, TheEndPutsOutputsAndInputsIntoTheirSafeState) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  measure(peer, 5);
+  ModbusProgram sut(plant, plant.write(device(port, "when_gone = \"zero\"")));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99 && plant.input_word(0) == 5;
+  })) << sut.log();
+  plant.put_out(0, 99);
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  EXPECT_EQ(peer.holding(7), 0);
+  EXPECT_EQ(plant.input_word(0), 0);
+  EXPECT_EQ(plant.status(56).quality, 0);
+  EXPECT_EQ(plant.status(56).age_ms, modbus::kNeverRead);
+}
+
+// The response would be waited for until its timeout.
+TEST(ModbusProcess, TheEndWaitsForNoStalledDevice) {
+  Plant plant;
+  const HeldPort port;
+  const ModbusPeer peer(port, Mode::stalls);
+  std::string text = device(port);
+  text.replace(text.find("timeout_ms = 200"), 16, "timeout_ms = 10000");
+  ModbusProgram sut(plant, plant.write(text));
+  ASSERT_TRUE(eventually([&] { return peer.requests() == 1; })) << sut.log();
+  const auto begin = MonotonicClock::now();
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  RecordProperty("ms", static_cast<int>((MonotonicClock::now() - begin) / 1ms));
+  EXPECT_FALSE(sut.logged("timed out")) << sut.log();
+  EXPECT_TRUE(sut.logged("plchost-modbus: ended"));
+}
+
+TEST(ModbusProcess, AnImageHasOneWriter) {
+  Plant plant;
+  const HeldPort port;
+  const ModbusPeer peer(port);
+  const ModbusProgram first(plant, plant.write(device(port)));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); })) << first.log();
+  ModbusProgram second(plant, plant.write(device(port)), "second.log");
+  EXPECT_EQ(second.end(), 1);
+  EXPECT_THAT(second.log(), HasSubstr("image 't.in' of pool"));
+  EXPECT_THAT(second.log(), HasSubstr("another process writes it"));
+}
+
+TEST(ModbusProcess, AKilledProcessLeavesAnImageThatTheNextTakesOver) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  measure(peer, 5);
+  const std::string config = plant.write(device(port));
+  ModbusProgram first(plant, config);
+  ASSERT_TRUE(eventually([&] { return plant.input_word(0) == 5; })) << first.log();
+  EXPECT_EQ(first.end(SIGKILL), -SIGKILL);
+  EXPECT_EQ(plant.input_word(0), 5);
+  peer.set(Mode::stalls);
+  const ModbusProgram second(plant, config, "second.log");
+  EXPECT_TRUE(eventually([&] { return plant.status(56).quality != 1; })) << second.log();
+  EXPECT_EQ(plant.status(56).age_ms, modbus::kNeverRead);
+  EXPECT_EQ(plant.input_word(0), 5);
+  peer.set(Mode::normal);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
+}
+
+TEST(ModbusProcess, AnImageWhoseFileIsRemovedIsMadeAnew) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  measure(peer, 5);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(eventually([&] { return plant.input_word(0) == 5; })) << sut.log();
+  const std::string path = fmt::format("/dev/shm/{}.memory.t.in", plant.pool());
+  ASSERT_EQ(::unlink(path.c_str()), 0);
+  measure(peer, 6);
+  plc_image anew{};
+  ASSERT_TRUE(eventually([&] { return ::access(path.c_str(), F_OK) == 0; }));
+  ASSERT_TRUE(eventually([&] {
+    return plc_image_open(plant.pool().c_str(), "t.in", Plant::kSize, PLC_IMAGE_READ, &anew) == 0;
+  }));
+  std::array<std::uint16_t, Plant::kSize / 2> words{};
+  EXPECT_TRUE(eventually(
+      [&] { return plc_image_read(&anew, words.data(), nullptr) == PLC_IMAGE_OK && words[0] == 6; }));
+  plc_image_close(&anew);
+}
+
+TEST(ModbusProcess, ABadConfigurationIsRefusedWithItsLine) {
+  Plant plant;
+  const std::string file = plant.write("[[device]]\nname = \"d\"\ntcp = \"somewhere\"\n");
+  ModbusProgram sut(plant, file);
+  EXPECT_EQ(sut.end(), 1);
+  EXPECT_THAT(sut.log(), HasSubstr(file + ":13:1: [[device]] 'd' tcp: \"somewhere\" is no address"));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# The variables of a running program, from anywhere: seen, written, forced, watched and recorded, with each process of the
+# host but the instance killed in between.
+. "$(dirname "$0")/common.sh"
+
+write_host cell $(seq "$first_core" "$last_core")
+write_instance cell line1 "$first_core" line_variables 'share_core = true'
+write_instance cell line2 "$first_core" bottling_line 'share_core = true'
+start_manager cell
+until_true 20 state_is line1 running
+
+value() { plcctl read variable line1 "$1" --json | jq -r '.[0].value'; }
+field() { plcctl list variables line1 "$1" --json | jq -r ".[0].$2"; }
+forces() { plcctl list forces --json | jq -r 'map("\(.instance) \(.name)=\(.forced_value)") | join(" ")'; }
+
+echo "- seen: names, types, tasks, values"
+is "$(plcctl list variables line1 --json | jq -r 'map(.name) | join(" ")')" \
+  "fast.count fast.twice grid[][] line.label line.setpoint line.stopped line.total" || fail "$(plcctl list variables line1)"
+is "$(field fast.count type),$(field fast.count task)" "DINT,Fast" || fail "$(plcctl list variables line1)"
+is "$(field grid type)" "ARRAY [1..2, 0..2] OF INT" || fail "$(plcctl list variables line1 grid)"
+is "$(value 'grid[2,1]')" 21 || fail "$(plcctl list variables line1 grid)"
+is "$(value line.LABEL)" "'press'" || fail "$(value line.label)"
+refused "no variable 'line.totel'" plcctl read variable line1 line.totel
+refused "'line7'" plcctl list variables line7
+
+echo "- two variables that a task changes together are never seen apart"
+for _ in $(seq 50); do
+  plcctl read variable line1 fast.count fast.twice --json |
+    jq -e '(.[0].value | tonumber) * 2 == (.[1].value | tonumber)' >/dev/null || fail "two values of different cycles"
+done
+
+echo "- written: once, between two cycles"
+plcctl write variable line1 line.setpoint=40
+follows() { is "$(value line.total)" "$1"; }
+until_true 10 follows 41
+refused "-32768 to 32767" plcctl write variable line1 line.setpoint=40000
+refused "declared it as read-only" plcctl write variable line1 line.stopped=TRUE
+is "$(value line.setpoint)" 40 || fail "a refused value was written: $(value line.setpoint)"
+
+echo "- forced: the program's own value does not count"
+plcctl force variable line1 line.total=7 'grid[1,1]=99'
+is "$(forces)" "line1 grid[1,1]=99 line1 line.total=7" || fail "$(plcctl list forces)"
+is "$(value line.total)" 7 || fail "$(value line.total)"
+told() { instance line1 problem | grep -q '2 values of variables are forced'; }
+until_true 10 told
+
+echo "- the API server and the manager are killed: still forced"
+kill -KILL "$(pgrep -P "${managers[0]}" -x plchost-dds)"
+until_true 20 follows 7
+kill -KILL "${managers[0]}"
+wait "${managers[0]}" 2>/dev/null || true
+start_manager cell
+until_true 20 state_is line1 running
+is "$(forces)" "line1 grid[1,1]=99 line1 line.total=7" || fail "$(plcctl list forces)"
+
+echo "- unforced: the program goes on with its own"
+plcctl unforce variable line1 line.total
+until_true 10 follows 41
+is "$(forces)" "line1 grid[1,1]=99" || fail "$(plcctl list forces)"
+plcctl unforce variable line1 --all
+is "$(forces)" "" || fail "$(plcctl list forces)"
+refused "is not forced" plcctl unforce variable line1 line.total
+
+echo "- watched and recorded"
+plcctl watch variables line1 fast.count --interval 0.02 --count 5 --json >"$cell/watched.txt"
+is "$(jq -r .value "$cell/watched.txt" | sort -n | uniq | wc -l)" 5 || fail "$(cat "$cell/watched.txt")"
+plcctl record variables line1 'fast.*' line.label --interval 0.02 --duration 1 --file "$cell/record.csv"
+is "$(head -n 1 "$cell/record.csv")" "time,time_unix_ns,consistent,fast.count,fast.twice,line.label" || fail "$(head -n 3 "$cell/record.csv")"
+[ "$(wc -l <"$cell/record.csv")" -gt 5 ] || fail "$(cat "$cell/record.csv")"
+awk -F, 'NR > 1 && $4 * 2 != $5 { exit 1 }' "$cell/record.csv" || fail "two values of different cycles: $(cat "$cell/record.csv")"
+
+echo "- a reset ends forces, and says so"
+plcctl force variable line1 line.total=7
+plcctl reset instance line1
+is "$(forces)" "" || fail "$(plcctl list forces)"
+plcctl start instance line1
+until_true 10 follows 21
+plcctl logs line1 | grep -q '1 forces end, because' || fail "$(plcctl logs line1)"
+
+echo "- an instance that stands still answers no longer, the others do"
+pid=$(instance line1 pid)
+kill -STOP "$pid"
+refused "has not answered" plcctl read variable line1 line.total
+plcctl list instances >/dev/null
+kill -CONT "$pid"
+until_true 20 follows 21
+refused "declares no variables" plcctl list variables line2
+
+kill -TERM "${managers[-1]}"
+wait "${managers[-1]}" || fail "the manager ended with $?"
+managers=()
+nothing_left

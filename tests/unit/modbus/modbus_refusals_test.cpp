@@ -1,0 +1,83 @@
+#include <gmock/gmock.h>
+
+#include "tests/unit/modbus/parsed_text.hpp"
+
+namespace plchost::modbus {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Refusal {
+  const char* text;  ///< behind the images
+  const char* error;
+};
+class RefusedModbusConfig : public ::testing::TestWithParam<Refusal> {};
+
+TEST_P(RefusedModbusConfig, SaysWhatIsAllowed) {
+  EXPECT_THAT(refused(GetParam().text), HasSubstr(GetParam().error));
+}
+
+#define DEVICE "[[device]]\nname = \"d\"\ntcp = \"127.0.0.1\"\n"
+#define READ "[[device.read]]\naddress = 0\nimage = \"t.in\"\n"
+#define WRITE "[[device.write]]\naddress = 0\nimage = \"t.out\"\n"
+#define SERVER "[server]\nlisten = \"127.0.0.1:1502\"\n[[server.map]]\naddress = 0\n"
+const Refusal kRefusals[] = {
+    {"", "m.toml: has nothing to do; add a [[device]] or [server]"},
+    {"[devices]\n", "m.toml:9:2: unknown section or key 'devices'"},
+    {"[device]\nname = \"d\"\n", "'device' must be written [[device]]"},
+    {"[[server]]\n", "'server' must be a section: [server]"},
+    {"[[device]]\nname = \"d\"\ntcp = \"1.2.3.4\"\n", "the device has no map"},
+    {"[[device]]\nname = \"d\"\n" READ "kind = \"coil\"\n", "tcp: is missing, and so is serial"},
+    {DEVICE "serial = \"/dev/ttyS0\"\n" READ "kind = \"coil\"\n", "stands beside serial"},
+    {DEVICE "baud = 9600\n" READ "kind = \"coil\"\n", "m.toml:12:1: [[device]] 'd' baud: is for serial"},
+    {DEVICE "unit = 250\n" READ "kind = \"coil\"\n", "250 is reserved; allowed is 0 to 247, and 255"},
+    {"[[device]]\nname = \"d\"\nserial = \"/dev/ttyS0\"\nunit = 0\n" READ "kind = \"coil\"\n",
+     "0 is no address at a serial line; allowed is 1 to 247"},
+    {"[[device]]\nname = \"d\"\nserial = \"/dev/ttyS0\"\nbaud = 1300\n" READ "kind = \"coil\"\n",
+     "1300 is no speed; allowed are 1200, 2400"},
+    {"[[device]]\nname = \"d\"\nserial = \"ttyS0\"\n" READ "kind = \"coil\"\n", "is no path"},
+    {DEVICE "tcp_port = 502\n" READ "kind = \"coil\"\n", "unknown key 'tcp_port'"},
+    {DEVICE "reconnect_ms = 500\nreconnect_max_ms = 400\n" READ "kind = \"coil\"\n", "is below reconnect_ms"},
+    {DEVICE "status_offset = 4\n" READ "kind = \"coil\"\n", "status_offset: needs status_image"},
+    {DEVICE "status_image = \"t.in\"\nstatus_offset = 57\n" READ "kind = \"coil\"\n",
+     "the status has 8 bytes, and image 't.in' has 64"},
+    {DEVICE "status_image = \"t.out\"\n" READ "kind = \"coil\"\n", "is an output image"},
+    {DEVICE READ, "kind: is missing"},
+    {DEVICE "[[device.read]]\nkind = \"coil\"\nimage = \"t.in\"\n",
+     "address: is missing; allowed is 0 to 65535"},
+    {DEVICE "[[device.read]]\nkind = \"coil\"\naddress = 0\n", "image: is missing"},
+    {DEVICE READ "kind = \"coil\"\ncount = 2001\n", "allowed is 1 to 2000 of kind coil"},
+    {DEVICE READ "kind = \"input_register\"\ncount = 126\n", "allowed is 1 to 125 of kind input_register"},
+    {DEVICE WRITE "kind = \"holding_register\"\ncount = 124\n",
+     "allowed is 1 to 123 of kind holding_register"},
+    {DEVICE WRITE "kind = \"coil\"\ncount = 1969\n", "allowed is 1 to 1968 of kind coil"},
+    {DEVICE WRITE "kind = \"input_register\"\n", "input_register can only be read"},
+    {DEVICE WRITE "kind = \"coil\"\nwritable = true\n", "unknown key 'writable'"},
+    {DEVICE READ "kind = \"coil\"\nrewrite_ms = 5\n", "unknown key 'rewrite_ms'"},
+    {DEVICE "[[device.read]]\nkind = \"coil\"\naddress = 0\nimage = \"t.out\"\n",
+     "'t.out' is an output image, which the PLC writes"},
+    {DEVICE "[[device.write]]\nkind = \"coil\"\naddress = 0\nimage = \"t.in\"\n", "'t.in' is an input image"},
+    {DEVICE READ "kind = \"holding_register\"\ncount = 33\n",
+     "the map ends at byte 66, and image 't.in' has 64"},
+    {DEVICE READ "kind = \"coil\"\noffset = 63\nbit = 4\ncount = 5\n", "the map ends at byte 65"},
+    {DEVICE READ "kind = \"holding_register\"\nbit = 1\n", "is for bits, and kind is holding_register"},
+    {DEVICE READ "kind = \"coil\"\norder = \"abcd\"\ncount = 2\n", "is for registers, and kind is coil"},
+    {DEVICE READ "kind = \"holding_register\"\norder = \"abcd\"\ncount = 3\n", "allowed is an even count"},
+    {DEVICE "[[device.read]]\nkind = \"coil\"\naddress = 65535\ncount = 2\nimage = \"t.in\"\n",
+     "from address 65535 there are 1 more; 2 are asked for"},
+    {SERVER "kind = \"coil\"\nimage = \"t.out\"\nwritable = true\n", "'t.out' is an output image"},
+    {SERVER "kind = \"discrete_input\"\nimage = \"t.in\"\nwritable = true\n",
+     "discrete_input can only be read"},
+    {"[server]\nlisten = \"0.0.0.0:502\"\n[[server.map]]\naddress = 0\nkind = \"coil\"\nimage = \"t.in\"\n",
+     "set allow_unsecured = true"},
+    {"[server]\nlisten = \"127.0.0.1:1502\"\n", "the server shows nothing; add [[server.map]]"},
+    {"[server]\nlisten = \"\"\n[[server.map]]\naddress = 0\nkind = \"coil\"\nimage = \"t.in\"\n",
+     "\"\" is no address"},
+    {"[server]\nconnections = 65\n[[server.map]]\naddress = 0\nkind = \"coil\"\nimage = \"t.in\"\n",
+     "65 is out of range; allowed is 1 to 64"},
+    {DEVICE "[[device.read]]\nkind = coil\n", "put texts in quotes"},
+};
+INSTANTIATE_TEST_SUITE_P(Each, RefusedModbusConfig, ::testing::ValuesIn(kRefusals));
+
+}  // namespace
+}  // namespace plchost::modbus
