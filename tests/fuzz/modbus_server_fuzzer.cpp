@@ -7,16 +7,17 @@
 #include <cstdint>
 #include <cstdlib>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
-#include <fmt/format.h>
 #include <modbus/modbus.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include "instances/io/modbus/images/image_table.hpp"
 #include "instances/io/modbus/server/request.hpp"
 #include "instances/io/modbus/server/served_maps.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace {
@@ -53,20 +54,20 @@ ServerConfig config() {
 
 struct Server {
   Server() {
-    const std::string pool = plchost::own_name("fuzz");
-    const std::vector<ImageConfig> wanted = {
-        {.name = "in", .direction = ImageDirection::input, .size = kSize, .line = 0},
-        {.name = "out", .direction = ImageDirection::output, .size = kSize, .line = 0}};
-    auto opened = ImageTable::open(pool, wanted);
+    auto opened = ImageTable::open(
+        pool, {{.name = "in", .direction = ImageDirection::input, .size = kSize, .line = 0},
+               {.name = "out", .direction = ImageDirection::output, .size = kSize, .line = 0}});
     if (!opened) std::abort();
     images = std::move(*opened);
-    for (const ImageConfig& image : wanted) {
-      ::unlink(fmt::format("/dev/shm/{}.memory.{}", pool, image.name).c_str());  // the mapping stays
-    }
     if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, sockets.data()) != 0)
       std::abort();
     modbus_set_socket(context, sockets[0]);
   }
+  ~Server() { plchost::remove_pool_memories(pool); }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  std::string pool = plchost::own_name("fuzz");
   ServerConfig server = config();
   ImageTable images;
   std::array<int, 2> sockets{};

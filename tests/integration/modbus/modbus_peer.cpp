@@ -123,19 +123,31 @@ void ModbusPeer::run() {
   }
 }
 
+// A request ends where the line is quiet. modbus_receive would take the one behind that of another unit for
+// its response, and lose its place.
 void ModbusPeer::run_line() {
+  Request request{};
+  std::size_t size = 0;
   while (!ends_) {
     pollfd look{.fd = line_, .events = POLLIN, .revents = 0};
-    if (::poll(&look, 1, kLookMs) > 0) (void)serve(line_);
+    if (::poll(&look, 1, kLookMs) > 0 && size < request.size()) {
+      size += static_cast<std::size_t>(
+          std::max<ssize_t>(::read(line_, &request.at(size), request.size() - size), 0));
+    } else if (size != 0) {
+      if (request[0] == unit_) (void)answer(line_, request, static_cast<int>(size));
+      size = 0;
+    }
   }
 }
 
 bool ModbusPeer::serve(int fd) {
   modbus_set_socket(context_, fd);
-  std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH> request{};
+  Request request{};
   const int size = modbus_receive(context_, request.data());
-  if (size < 0) return fd == line_;  // of a line: bytes that are no request
-  if (size == 0) return true;        // for another unit
+  return size >= 0 && answer(fd, request, size);
+}
+
+bool ModbusPeer::answer(int fd, Request& request, int size) {
   ++requests_;
   static constexpr std::array<char, 300> kGarbage{'g', 'a', 'r'};
   const std::lock_guard lock(mutex_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -22,8 +23,8 @@ class HeldPort {
   [[nodiscard]] std::string address() const;
 
  private:
+  std::uint16_t number_ = 0;  // before the socket, which sets it
   UniqueFd fd_;
-  std::uint16_t number_ = 0;
 };
 
 /// Two ends of a serial line: a terminal of the kernel that programs open, and the other end.
@@ -73,7 +74,9 @@ class ModbusPeer {
  private:
   void run();
   void run_line();
+  using Request = std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH>;
   [[nodiscard]] bool serve(int fd);
+  [[nodiscard]] bool answer(int fd, Request& request, int size);
   void make_mapping();
 
   modbus_t* context_ = nullptr;

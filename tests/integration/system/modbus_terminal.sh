@@ -2,7 +2,7 @@
 # A packer with a terminal on Modbus: its figures reach the terminal's registers, and the terminal's answer reaches the packer.
 # Each process of the chain is killed, and the device stalls, answers garbage and goes away: the packer loses no product.
 . "$(dirname "$0")/common.sh"
-host=modbus
+host=line
 
 write_host $host "$first_core"
 sed -e "s/terminal1/$host/" "$(dirname "$0")/../../../instances/examples/packer/packer.cfg" >"$cell/packer.cfg"
