@@ -5,7 +5,7 @@
 
 write_host cell $(seq "$first_core" "$last_core")
 write_instance cell line1 "$first_core" line_variables 'share_core = true'
-write_instance cell line2 "$first_core" packer 'share_core = true'
+write_instance cell line2 "$first_core" task_faults 'share_core = true'
 start_manager cell
 until_true 20 state_is line1 running
 
