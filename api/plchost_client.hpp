@@ -355,12 +355,12 @@ class PLCHOST_CLIENT_API Client {
   class Worker;
   class Watcher;
   class HostsWatch;
-  template <class Sample>
+  template <class TopicSample>
   class StatusWatch;
   class RecordsWatch;
   class TransitionsWatch;
   Watch begin_watch(std::shared_ptr<Watch::Subscription> subscription);
-  template <class Sample, class Item>
+  template <class TopicSample, class Item>
   Watch watch_items(const std::string& host, std::function<void(const Item&)> callback);
 
   std::unique_ptr<Worker> worker_;

@@ -64,10 +64,10 @@ class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Cl
 };
 
 /// Of one status topic.
-template <class Sample>
+template <class TopicSample>
 class __attribute__((visibility("hidden"))) Client::StatusWatch final : public Client::Watch::Subscription {
  public:
-  using Item = decltype(to_public(Sample{}));
+  using Item = decltype(to_public(TopicSample{}));
 
   StatusWatch(std::string host, std::function<void(const Item&)> callback)
       : host_(std::move(host)), callback_(std::move(callback)) {}
@@ -77,10 +77,10 @@ class __attribute__((visibility("hidden"))) Client::StatusWatch final : public C
 
   void tell(const News& news) override {
     for (const std::string& host : hosts_of(news.client, host_)) {
-      const auto samples = news.client.template status<Sample>(host, MonotonicClock::now());
+      const auto samples = news.client.template status<TopicSample>(host, MonotonicClock::now());
       if (!samples) continue;  // not complete yet: soon
       std::set<Key> there;
-      for (const Sample& sample : *samples) {
+      for (const TopicSample& sample : *samples) {
         Item item = to_public(sample);
         there.insert(key_of(item));
         tell_one(std::move(item));
@@ -218,11 +218,11 @@ Client::Watch Client::watch_hosts(std::function<void(const Host&)> callback) {
   return begin_watch(std::make_shared<HostsWatch>(std::move(callback)));
 }
 
-template <class Sample, class Item>
+template <class TopicSample, class Item>
 Client::Watch Client::watch_items(const std::string& host, std::function<void(const Item&)> callback) {
   check_callback(static_cast<bool>(callback));
   if (!host.empty()) worker_->check_watched(host);
-  return begin_watch(std::make_shared<StatusWatch<Sample>>(host, std::move(callback)));
+  return begin_watch(std::make_shared<StatusWatch<TopicSample>>(host, std::move(callback)));
 }
 
 Client::Watch Client::watch_instances(const std::string& host,
