@@ -28,7 +28,7 @@ std::string name_beside(const std::string& path, int attempt) {
 /// A second name of the file, or a copy where the file system has no links. Empty: there is no such file.
 Result<std::string> put_aside(const std::string& path) {
   for (int attempt = 0;; ++attempt) {
-    const std::string aside = name_beside(path, attempt);
+    std::string aside = name_beside(path, attempt);
     if (::link(path.c_str(), aside.c_str()) == 0) return aside;
     if (errno == ENOENT) return "";
     if (errno == EEXIST && attempt < kAttempts) continue;
