@@ -148,7 +148,8 @@ TEST(SymbolTable, WrongSymbolsAreRefused) {
   symbol = variable("a", VariableType::string);
   symbol.bytes = kMaxVariableBytes + 1;
   EXPECT_TRUE(is_wrong(symbol));
-  symbol = variable("a", static_cast<VariableType>(26));
+  symbol = variable("a");
+  symbol.type = static_cast<VariableType>(26);
   EXPECT_TRUE(is_wrong(symbol));
   symbol = variable("a");
   symbol.task = std::string(51, 't');
