@@ -32,8 +32,8 @@ constexpr unsigned variable_type() {
   if constexpr (std::is_same_v<T, double>) return PLC_TYPE_LREAL;
   if constexpr (std::is_same_v<T, std::chrono::nanoseconds>) return PLC_TYPE_TIME;
   if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool> && !std::is_same_v<T, char>) {
-    constexpr unsigned of_size[] = {0, 0, 1, 0, 2, 0, 0, 0, 3};  // NOLINT(modernize-avoid-c-arrays): C++17
-    return (std::is_signed_v<T> ? PLC_TYPE_SINT : PLC_TYPE_USINT) + of_size[sizeof(T)];
+    constexpr unsigned kOfSize[] = {0, 0, 1, 0, 2, 0, 0, 0, 3};  // NOLINT(modernize-avoid-c-arrays): C++17
+    return (std::is_signed_v<T> ? PLC_TYPE_SINT : PLC_TYPE_USINT) + kOfSize[sizeof(T)];
   }
   return 0;
 }

@@ -142,7 +142,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       require_name(resource.name);
       for (const iec::Task& task : resource.tasks) require_name(task.name + task.single);
       for (const iec::Program& program : resource.programs) require_name(program.name + program.type);
-      const matiec::Glue glue = matiec::write_glue(project, configuration, resource, {});
+      const iec::Glue glue = matiec::write_glue(project, configuration, resource, {});
       require_places(glue.problems);
       require_places(glue.remarks);
       (void)matiec::write_glue(project, configuration, resource, located);
