@@ -63,7 +63,9 @@ class Writer : public iec::GlueWriter {
     return fmt::format("plchost_run(g_config.{});", folded(program.name));
   }
   [[nodiscard]] std::string global(const std::string& name) const override {
-    return fmt::format("*strucpp::{}.raw_ptr() ? 1 : 0", plan().globals.at(name)->member);
+    const auto found = plan().globals.find(name);
+    if (found == plan().globals.end()) return "0";  // there is a problem already
+    return fmt::format("*strucpp::{}.raw_ptr() ? 1 : 0", found->second->member);
   }
   // The constructors have done it.
   void write_binding() override { print("void plchost_bind(void) {{}}\n"); }

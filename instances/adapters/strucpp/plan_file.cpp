@@ -27,6 +27,7 @@ constexpr std::size_t kMostEntries = 100'000;  // of one list
 constexpr std::size_t kMostText = 1'000'000;
 constexpr std::size_t kMostName = 500;
 constexpr int kMostPriority = 31;
+constexpr int kMostDepth = 20;  // of lists and objects within each other; translate.mjs writes 9
 
 constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
 
@@ -263,9 +264,15 @@ class Reader {
 }  // namespace
 
 Result<ReadPlan> read_plan(std::string_view text, std::span<const std::string> sources) {
-  const json root = json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (root.is_discarded()) return failure(ErrorCode::invalid_argument, "plan.json is no JSON");
+  // A value is shown in a message by a function that calls itself for each list in a list.
+  const auto shallow = [](int depth, json::parse_event_t /*event*/, json& /*value*/) {
+    if (depth > kMostDepth)
+      throw WrongPlan(fmt::format("more than {} lists and objects lie within each other", kMostDepth));
+    return true;
+  };
   try {
+    const json root = json::parse(text, shallow, /*allow_exceptions=*/false);
+    if (root.is_discarded()) return failure(ErrorCode::invalid_argument, "plan.json is no JSON");
     return Reader(sources).read(root);
   } catch (const WrongPlan& wrong) {
     return failure(ErrorCode::invalid_argument, fmt::format("plan.json: {}", wrong.what()));

@@ -182,6 +182,14 @@ TEST(StrucppGlue, RefusesAnEdgeThatNobodyWouldSee) {
       << "a variable of a program has a value of its own";
 }
 
+TEST(StrucppGlue, RefusesAnEdgeOfNoVariable) {
+  Parts parts;
+  const std::string single = R"("single":"GO")";
+  parts.tasks.replace(parts.tasks.find(single), single.size(), R"("single":"NONE")");
+  EXPECT_THAT(texts(glue_of(parts).problems),
+              Contains("a.st:10:5: SINGLE of edge: 'NONE' is no BOOL of a VAR_GLOBAL"));
+}
+
 TEST(StrucppPlan, TellsWhatTheCompilerFound) {
   Parts parts;
   parts.head = R"("problems":[{"place":[0,3,5],"text":"wrong"}],"remarks":[{"place":[-1,0,0],"text":"so"}])";
@@ -238,6 +246,13 @@ TEST(StrucppPlan, RefusesWhatIsNoPlan) {
     ASSERT_FALSE(plan) << told;
     EXPECT_THAT(plan.error().message, HasSubstr(told));
   }
+}
+
+TEST(StrucppPlan, RefusesListsInListsWithoutEnd) {
+  constexpr std::size_t kLists = 100'000;
+  const auto plan = read_plan(std::string(kLists, '[') + std::string(kLists, ']'), {});
+  ASSERT_FALSE(plan);
+  EXPECT_THAT(plan.error().message, HasSubstr("more than 20 lists and objects lie within each other"));
 }
 
 TEST(StrucppCompiler, SaysHowToGetOne) {

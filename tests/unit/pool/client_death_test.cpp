@@ -309,7 +309,9 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   const auto segment = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
   const PoolView view(segment->bytes(), kRoom);
   constexpr unsigned kRounds = 500;
-  for (unsigned round = 0; round < kRounds; ++round) {
+  // On a busy machine some of them die before they are clients.
+  const auto enough = [&] { return view.header().departed.load() > kRounds; };
+  for (unsigned round = 0; round < kRounds || (!enough() && round < 4 * kRounds); ++round) {
     std::array<pid_t, 3> children{};
     for (unsigned i = 0; pid_t & child : children) {
       child = ::fork();
@@ -345,7 +347,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   }
   EXPECT_GT(view.header().repairs.load(), 0U) << "none of them died with the pool's lock held";
   EXPECT_EQ(view.header().rebuilds.load(), 0U) << "the unfinished step of one of them was not undone";
-  EXPECT_GT(view.header().departed.load(), kRounds);
+  EXPECT_TRUE(enough());
 }
 
 /// The result of a process of another PID namespace that tries to use the pool: 0 is right.
