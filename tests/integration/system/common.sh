@@ -24,10 +24,11 @@ ours() { grep -lFf <(echo "$cell/") /proc/[0-9]*/cmdline 2>/dev/null | cut -d/ -
 
 clean_up() {
   local pid
-  for pid in "${others[@]}" "$domain_pid"; do kill -KILL "$pid" 2>/dev/null || true; done
+  for pid in "${others[@]}"; do kill -KILL "$pid" 2>/dev/null || true; done
   for pid in "${managers[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
   for pid in "${managers[@]}"; do wait "$pid" 2>/dev/null || true; done
   for pid in $(ours); do kill -KILL "$pid" 2>/dev/null || true; done
+  kill -KILL "$domain_pid" 2>/dev/null || true  # last: another test may take the domain at once
   rm -rf "$cell" "/dev/shm/$pool" "/dev/shm/$pool"[-.]*
 }
 trap clean_up EXIT

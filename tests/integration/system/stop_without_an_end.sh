@@ -30,7 +30,7 @@ echo "- it is an exception like any other: shown and listed"
 until_true 20 has present true
 has count 1 && has task Other && has kind "stop_timeout" && has stopped application || fail "$(plcctl show exception line1)"
 exception text | grep -qF 'after 300 ms, the limit of the second phase of a stop' || fail "$(exception text)"
-plcctl list exceptions | grep -q 'Other .*stop timeout .*300 ms' || fail "$(plcctl list exceptions)"
+plcctl list exceptions | grep -q 'Other .*stop_timeout .*300 ms' || fail "$(plcctl list exceptions)"
 
 echo "- a reset leads out of it; the exception stays known"
 plcctl reset instance line1 && plcctl start instance line1 && state_is line1 running || fail "reset and start failed"

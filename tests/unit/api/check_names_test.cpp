@@ -32,10 +32,11 @@ TEST(CheckNames, TakesTheLongestAndSaysWhatIsAllowedOneBeyond) {
 }
 
 TEST(CheckNames, TakesRequestsUpToTheBoundOfEachField) {
-  EXPECT_EQ(refusal(check_api_request({text(kMaxHostName), 1, text(kMaxInstanceName), text(kMaxPath)})), "");
+  EXPECT_EQ(refusal(check_api_request({text(kMaxHostName), 1, text(kMaxInstanceName), text(kMaxArgument)})),
+            "");
   EXPECT_THAT(refusal(check_api_request({text(kMaxHostName + 1), 1, "i", ""})), HasSubstr("1 to 63"));
   EXPECT_THAT(refusal(check_api_request({"h", 1, text(kMaxInstanceName + 1), ""})), HasSubstr("1 to 31"));
-  EXPECT_THAT(refusal(check_api_request({"h", 1, "i", text(kMaxPath + 1)})), HasSubstr("up to 255"));
+  EXPECT_THAT(refusal(check_api_request({"h", 1, "i", text(kMaxArgument + 1)})), HasSubstr("up to 511"));
 }
 
 TEST(CheckNames, TakesARequestForTheWholeHost) {
