@@ -74,9 +74,12 @@ class StrucppTranslator : public Translator {
     const std::string file = name + ".cpp";
     if (!context_.has(context_.folder().write(file, glue))) return false;
     const std::string adapters = context_.adapters();
+    std::vector<std::string> sources{file};
+    for (const fs::path source : context_.application_files())
+      sources.push_back(source.stem().string() + ".o");
     return context_.compile("the C++ compiler", words_,
                             {.kind = CompileOrder::Kind::cpp_application,
-                             .sources = {file, "application.o", "places.o", "variables.o"},
+                             .sources = std::move(sources),
                              .folders = {adapters + "/application", adapters + "/strucpp", compiler_.headers,
                                          context_.folder().path()},
                              .output = made,
