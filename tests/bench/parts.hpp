@@ -39,6 +39,7 @@ struct Part {
 [[nodiscard]] Result<std::vector<Row>> measure_pool_deaths(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_blocks(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_start(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_structured_text(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_fleet(const Plan& plan);
 
 }  // namespace plchost::bench
