@@ -49,6 +49,7 @@ class StrucppTranslator : public Translator {
     std::ranges::move(plan->remarks, std::back_inserter(context_.report.remarks));
     context_.project = std::move(plan->project);
     files_ = std::move(plan->files);
+    symbols_ = std::move(plan->symbols);
     return context_.good();
   }
 
@@ -67,7 +68,8 @@ class StrucppTranslator : public Translator {
   }
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
-    return strucpp::write_glue(context_.project, context_.project.configurations.front(), resource, files_);
+    return strucpp::write_glue(context_.project, context_.project.configurations.front(), resource, files_,
+                               symbols_);
   }
 
   bool compile(const std::string& name, const std::string& glue, const fs::path& made) override {
@@ -76,7 +78,7 @@ class StrucppTranslator : public Translator {
     const std::string adapters = context_.adapters();
     return context_.compile("the C++ compiler", words_,
                             {.kind = CompileOrder::Kind::cpp_application,
-                             .sources = {file, "application.o", "places.o", "variables.o"},
+                             .sources = {file, "application.o", "places.o", "symbols.o", "variables.o"},
                              .folders = {adapters + "/application", adapters + "/strucpp", compiler_.headers,
                                          context_.folder().path()},
                              .output = made,
@@ -142,6 +144,7 @@ class StrucppTranslator : public Translator {
   BuildContext& context_;
   strucpp::Compiler compiler_;
   std::vector<std::string> files_;
+  std::vector<strucpp::PlannedSymbol> symbols_;
   std::vector<std::string> words_;
   std::vector<std::string> flags_;
 };
