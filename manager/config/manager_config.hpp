@@ -30,7 +30,8 @@ struct HostConfig {
   std::vector<int> cores;   ///< where instances may run
   std::vector<int> housekeeping_cores;  ///< where the manager and the API server run
   std::string log_level = "info";
-  bool keep_pool = false;  ///< leave the pool in place at the end, for firmware that has it mapped
+  bool allow_debug = true;  ///< instances may load applications that are debug builds
+  bool keep_pool = false;   ///< leave the pool in place at the end, for firmware that has it mapped
 };
 
 /// [dds]: how the API server is reached.
