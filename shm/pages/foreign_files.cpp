@@ -30,9 +30,9 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
     return memory->ends_with(kOfInstances) ? Owners::trusted : Owners::writers_of_pool;
   }
   const std::array names = {std::string(pool), host_page_name(pool), fmt::format("{}.posts", pool)};
-  const std::array beginnings = {instance_page_name(pool, ""),      instance_claim_name(pool, ""),
-                                 transition_ring_name(pool, ""),    log_ring_name(pool, ""),
-                                 fmt::format("{}.download.", pool), fmt::format("{}.wish.", pool),
+  const std::array beginnings = {instance_page_name(pool, ""),       instance_claim_name(pool, ""),
+                                 transition_ring_name(pool, ""),     log_ring_name(pool, ""),
+                                 fmt::format("{}.download.", pool),  fmt::format("{}.wish.", pool),
                                  fmt::format("{}.variables.", pool), fmt::format("{}.debug.", pool)};
   const bool ours =
       std::ranges::find(names, file) != names.end() ||
