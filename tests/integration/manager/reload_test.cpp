@@ -17,6 +17,7 @@
 #include "tests/integration/manager/costs_cycles.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/receive_until.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace plchost {
 namespace {
@@ -300,6 +301,7 @@ TEST_F(ReloadOfTheHost, StartsAndEndsTheApiServerAsTheFileSays) {
 
 // A server that is ended before its answer has reached the client would have the client ask once more.
 TEST_F(ReloadOfTheHost, EndsTheApiServerWhenCommandsAreAnsweredOnly) {
+  if (kSanitized) GTEST_SKIP() << "a reload may take longer than the command that it waits for";
   plant_.use_api_server(kToldServer);
   plant_.add("slow", "bottling_line");
   plant_.start_manager();
@@ -320,6 +322,7 @@ TEST_F(ReloadOfTheHost, EndsTheApiServerWhenCommandsAreAnsweredOnly) {
 }
 
 TEST_F(ReloadOfTheHost, NamesEachKeyThatWaitsAndForWhat) {
+  if (kSanitized) GTEST_SKIP() << "ten reloads may take longer than a server has to come up";
   start_served();
   const std::string run = plant_.run_directory();
   const std::string state = plant_.state_directory();
