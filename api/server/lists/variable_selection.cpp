@@ -43,12 +43,17 @@ Result<void> check_wildcards(const VariableQuery& query) {
 // The rows of the table that a query names, each once, in their order.
 using Chosen = std::map<std::uint64_t, SelectedVariable>;
 
-void choose(Chosen& chosen, std::uint32_t symbol, std::optional<std::uint32_t> element, std::uint64_t after) {
+/// False: neither this row nor one behind it has room on the page.
+bool choose(Chosen& chosen, std::uint32_t symbol, std::optional<std::uint32_t> element, std::uint64_t after) {
   const std::uint64_t place = place_of(symbol, element);
-  if (place <= after) return;
+  if (place <= after) return true;
   chosen.try_emplace(place, SelectedVariable{.symbol = symbol, .element = element});
   // More than a page has room for is not looked at in this one.
-  if (chosen.size() > kPageVariables + 1) chosen.erase(std::prev(chosen.end()));
+  if (chosen.size() <= kPageVariables + 1) return true;
+  const auto last = std::prev(chosen.end());
+  const bool has_room = last->first != place;
+  chosen.erase(last);
+  return has_room;
 }
 
 void choose_all(Chosen& chosen, const SymbolTable& table, std::uint64_t after) {
@@ -59,13 +64,18 @@ void choose_all(Chosen& chosen, const SymbolTable& table, std::uint64_t after) {
 }
 
 void choose_like(Chosen& chosen, const SymbolTable& table, const std::string& pattern, std::uint64_t after) {
+  const bool by_index = pattern.contains('[');
   for (const SymbolTable::Match& match : table.match(pattern)) {
-    const bool by_index = pattern.find('[') != std::string::npos;
-    if (match.elements.empty() && !by_index) choose(chosen, match.symbol, std::nullopt, after);
-    const std::uint32_t all =
-        match.elements.empty() && by_index ? table.symbols()[match.symbol].elements() : 0;
-    for (std::uint32_t element = 0; element < all; ++element) choose(chosen, match.symbol, element, after);
-    for (const std::uint32_t element : match.elements) choose(chosen, match.symbol, element, after);
+    if (!by_index) {
+      choose(chosen, match.symbol, std::nullopt, after);
+    } else if (match.elements.empty()) {  // all of them, one by one
+      const std::uint32_t count = table.symbols()[match.symbol].elements();
+      for (std::uint32_t element = 0; element < count; ++element) {
+        if (!choose(chosen, match.symbol, element, after)) break;
+      }
+    } else {
+      for (const std::uint32_t element : match.elements) choose(chosen, match.symbol, element, after);
+    }
   }
 }
 
