@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <string>
 #include <vector>
 
 #include <signal.h>
@@ -13,8 +16,31 @@
 
 namespace plchost {
 
+/// The code that the kernel puts into each process, above all its clock.
+class KernelCode {
+ public:
+  KernelCode() {
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);) {
+      if (line.ends_with("[vdso]")) {
+        char* rest = nullptr;
+        begin_ = std::strtoull(line.c_str(), &rest, 16);
+        end_ = std::strtoull(rest + 1, nullptr, 16);
+      }
+    }
+  }
+  [[nodiscard]] bool contains(std::uintptr_t address) const noexcept {
+    return begin_ <= address && address < end_;
+  }
+
+ private:
+  std::uintptr_t begin_ = 0;
+  std::uintptr_t end_ = 0;
+};
+
 /// A child that is led from instruction to instruction by a debugger, until it stops itself by SIGSTOP. It is
-/// killed at the end.
+/// killed at the end. A read of the kernel's clock is one step: it begins again whenever the kernel sets that
+/// clock, which it does between any two steps of a busy machine.
 class SteppedChild {
  public:
   /// The address of each instruction, in the order in which they were executed.
@@ -35,7 +61,7 @@ class SteppedChild {
     Trace trace;
     do {
       trace.push_back(place());
-    } while (go_on(PTRACE_SINGLESTEP));
+    } while (step());
     return trace;
   }
   /// Leads a child that is at place `from` of `trace` to place `to`. Single steps are slow on a virtual
@@ -49,7 +75,7 @@ class SteppedChild {
     const auto passed = static_cast<std::size_t>(std::count(at(from), at(to), trace[to]));
     if (kCanBreak && 4 * (passed + 1) < to - from) return run_to(trace[to], passed);
     bool within = true;
-    for (; within && from < to; ++from) within = go_on(PTRACE_SINGLESTEP);
+    for (; within && from < to; ++from) within = step();
     return within;
   }
 
@@ -57,9 +83,11 @@ class SteppedChild {
 #if defined(__x86_64__)
   static constexpr bool kCanBreak = true;
   static constexpr std::size_t kPlace = offsetof(user, regs.rip);
+  static constexpr std::size_t kStack = offsetof(user, regs.rsp);
 #else
   static constexpr bool kCanBreak = false;
   static constexpr std::size_t kPlace = 0;
+  static constexpr std::size_t kStack = 0;
 #endif
 
   [[nodiscard]] std::uintptr_t place() const noexcept {
@@ -70,6 +98,13 @@ class SteppedChild {
     ::ptrace(how, child_, nullptr, nullptr);
     ::waitpid(child_, &status_, 0);
     return WIFSTOPPED(status_) && WSTOPSIG(status_) == SIGTRAP;
+  }
+  [[nodiscard]] bool step() noexcept {
+    if (!go_on(PTRACE_SINGLESTEP)) return false;
+    if (!kCanBreak || !clock_.contains(place())) return true;
+    // At the first instruction of the call, the stack holds where it returns to.
+    const auto stack = static_cast<std::uintptr_t>(::ptrace(PTRACE_PEEKUSER, child_, kStack, nullptr));
+    return run_to(static_cast<std::uintptr_t>(::ptrace(PTRACE_PEEKDATA, child_, stack, nullptr)), 0);
   }
   [[nodiscard]] bool run_to(std::uintptr_t address, std::size_t passed) noexcept {
     constexpr std::uintptr_t kByte = 0xff;
@@ -82,13 +117,14 @@ class SteppedChild {
       if (!within) return false;
       ::ptrace(PTRACE_POKEUSER, child_, kPlace, address);
       if (passed == 0) return true;
-      within = go_on(PTRACE_SINGLESTEP);
+      within = step();
     }
     return false;
   }
 
   pid_t child_;
   int status_ = 0;
+  KernelCode clock_;  // the child is a fork, so it has the same addresses
 };
 
 }  // namespace plchost
