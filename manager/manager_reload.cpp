@@ -17,6 +17,7 @@
 #include "shm/log/log.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
+#include "shm/pages/outputs_page.hpp"
 #include "shm/variables/symbol_page.hpp"
 
 namespace plchost {
@@ -131,6 +132,7 @@ void Manager::remove_pages(const std::string& instance) const {
   SymbolPage::remove(config_.host.pool, instance);
   TransitionRing::remove(config_.host.pool, instance);
   LogRing::remove(config_.host.pool, instance);
+  OutputsPage::remove(config_.host.pool, instance);
 }
 
 }  // namespace plchost

@@ -33,6 +33,7 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
   UniqueFd fault_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (!fault_fd) return failure(ErrorCode::system, "cannot create an event descriptor for faults", errno);
   std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment), std::move(fault_fd)));
+  self->fault_board_.tell(self->environment_.halted);
   for (TaskConfig& config : tasks) {
     const std::string step = fmt::format("task '{}'", config.name);
     if (auto added = self->add(std::move(config)); !added) return failure_in(step, std::move(added.error()));

@@ -77,6 +77,9 @@ struct TaskEnvironment {
   /// the phase of the stop that the task belongs to. May be empty. Called by the control thread,
   /// from within begin_stop() and advance_stop().
   std::function<void(std::size_t index)> to_park;
+  /// Tells that no task begins another cycle: a fault of the whole application. May be empty. Called by its
+  /// finder, in a signal handler perhaps, and once more for each further one.
+  std::function<void()> halted{};
   /// Faults and endless loops in the application's code put their task into exception: handlers for signals
   /// are installed in this process (see install_fault_handlers()), and a thread supervises the tasks. Without
   /// it a fault ends the process.

@@ -20,8 +20,18 @@
  * writer PLC_IMAGE_SLOTS - 2 publications.
  *
  * Inputs are copied in at the start of a task's cycle, outputs out at its end. The stamp tells when an image
- * was published: firmware that sees an old one (the instance was stopped, or is gone) brings its outputs into
- * a safe state.
+ * was published.
+ *
+ * The dead-man word tells what the writer does, also after its end: plc_image_state(). An instance has a safe
+ * image beside its outputs ([SysMem] Linux.Area.n.SafeState). While no task drives the outputs,
+ * plc_image_read gives the safe image: after a stop, a fault, a hit of a watchdog, and the end of the
+ * process, which the manager tells. Without a manager nobody tells that: the writer is silent then. Firmware
+ * looks at both ages:
+ *
+ *     silent = plc_image_heartbeat_age_ns(&outputs) > limit ||
+ *              (plc_image_state(&outputs) == PLC_IMAGE_STATE_RUNNING && plc_image_age_ns(&outputs) > limit);
+ *
+ * An instance writes its heartbeat every 100 ms. After PLC_IMAGE_STATE_ENDED there is none.
  *
  * The file is a memory of the pool: an object like all others once anybody opens it by name there, or the
  * manager has looked, provided that its owner may write the pool.
@@ -55,23 +65,42 @@ typedef unsigned long plc_image_u64;
 typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 
 #define PLC_IMAGE_MAGIC 0x6567616d69636c70UL /* "plcimage", as bytes in memory */
-#define PLC_IMAGE_VERSION 1u
+#define PLC_IMAGE_VERSION 2u
 #define PLC_IMAGE_PATH "/dev/shm/%s.memory." /* pool; then the name, see plc_image_path() */
 #define PLC_IMAGE_PATH_SIZE 265              /* of the longest path, with its end */
 #define PLC_IMAGE_MAX_NAME 95u               /* bytes of UTF-8 */
-#define PLC_IMAGE_SLOTS 16u
-#define PLC_IMAGE_MAX_SIZE 1048576u /* bytes of inputs or outputs in one image */
+#define PLC_IMAGE_SLOTS 16u                  /* of images that are published one after the other */
+#define PLC_IMAGE_SAFE_SLOTS 2u              /* behind them: the safe image, and the next one */
+#define PLC_IMAGE_MAX_SIZE 1048576u          /* bytes of inputs or outputs in one image */
 
-/* The layout: this, then PLC_IMAGE_SLOTS slots, each a plc_image_slot and the bytes, padded to 64. All zero
- * but for the first four is an image into which nothing was written yet. */
+/* The dead-man word: the state of the writer in the lowest 8 bits, then whether its safe image is shown. The
+ * rest counts the changes. */
+#define PLC_IMAGE_STATE 0xffUL
+#define PLC_IMAGE_SHOWS_SAFE 0x100UL
+#define PLC_IMAGE_ONE_CHANGE 0x10000UL
+
+/* The states. */
+#define PLC_IMAGE_STATE_UNTOLD 0u    /* the writer tells none: firmware that writes inputs */
+#define PLC_IMAGE_STATE_RUNNING 1u   /* a cycle has ended since the start */
+#define PLC_IMAGE_STATE_STOPPED 2u   /* or just started, or between single cycles */
+#define PLC_IMAGE_STATE_EXCEPTION 3u /* a fault or a watchdog */
+#define PLC_IMAGE_STATE_HALTED 4u    /* a debugger holds the tasks */
+#define PLC_IMAGE_STATE_ENDED 5u     /* the process has ended, in order or not */
+
+/* The layout: this, then PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS slots, each a plc_image_slot and the bytes,
+ * padded to 64. All zero but for the first four is an image into which nothing was written yet. */
 typedef struct {
-  plc_image_u64 magic;  /* written last, by the maker of the image */
-  unsigned int version; /* PLC_IMAGE_VERSION */
-  unsigned int slots;   /* PLC_IMAGE_SLOTS */
-  plc_image_u64 size;   /* bytes of one image */
-  plc_image_u64 reserved[5];
-  plc_image_u64 latest; /* sequence of the latest image * 256 + its slot; 0: none yet */
-  plc_image_u64 reserved_too[7];
+  plc_image_u64 magic;        /* written last, by the maker of the image */
+  unsigned int version;       /* PLC_IMAGE_VERSION */
+  unsigned int slots;         /* PLC_IMAGE_SLOTS */
+  plc_image_u64 size;         /* bytes of one image */
+  plc_image_u64 control;      /* the dead-man word */
+  plc_image_u64 safe;         /* sequence of the safe image * 256 + its slot; 0: none */
+  plc_image_u64 on_end;       /* 1: the safe image is shown when the writer has ended; 0: no change */
+  plc_image_u64 writer;       /* its process number */
+  plc_image_i64 heartbeat_ns; /* CLOCK_MONOTONIC, its last sign */
+  plc_image_u64 latest;       /* sequence of the latest image * 256 + its slot; 0: none yet */
+  plc_image_u64 reserved[7];
 } plc_image_header;
 
 typedef struct {
@@ -106,7 +135,7 @@ static __inline__ unsigned long plc_image_stride(unsigned int size) {
 
 /* Bytes of the whole memory. */
 static __inline__ unsigned long plc_image_bytes(unsigned int size) {
-  return sizeof(plc_image_header) + PLC_IMAGE_SLOTS * plc_image_stride(size);
+  return sizeof(plc_image_header) + (PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) * plc_image_stride(size);
 }
 
 static __inline__ plc_image_slot* plc_image_slot_at(const plc_image* image, unsigned int slot) {
@@ -161,7 +190,8 @@ static __inline__ void plc_image_write(const plc_image* image, const void* bytes
   __atomic_store_n(&image->header->latest, sequence << 8 | number, __ATOMIC_RELEASE);
 }
 
-/* Copies the image that `latest` names. 1: done, and it was not overwritten meanwhile. Real-time. */
+/* Copies the image that `latest` names, one of those or the safe one. 1: done, and it was not overwritten
+ * meanwhile. Real-time. */
 static __inline__ int plc_image_copy(const plc_image* image, plc_image_u64 latest, void* bytes,
                                      plc_image_i64* stamp_ns) {
   const unsigned int number = (unsigned int)(latest & 0xffu);
@@ -169,7 +199,7 @@ static __inline__ int plc_image_copy(const plc_image* image, plc_image_u64 lates
   const plc_image_slot* slot;
   const plc_image_u64* words;
   unsigned int i;
-  if (number >= PLC_IMAGE_SLOTS) return 0;
+  if (number >= PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) return 0;
   slot = plc_image_slot_at(image, number);
   words = (const plc_image_u64*)(const void*)(slot + 1);
   if (__atomic_load_n(&slot->sequence, __ATOMIC_ACQUIRE) != latest >> 8) return 0;
@@ -186,17 +216,103 @@ static __inline__ int plc_image_copy(const plc_image* image, plc_image_u64 lates
   return __atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) == latest >> 8;
 }
 
-/* Copies the latest image to `bytes`, image->size of them; PLC_IMAGE_...; `stamp_ns` may be null. Unless it
- * says PLC_IMAGE_OK, what is in `bytes` may be half of another image. A few attempts, then it gives up:
- * real-time. */
+/* The dead-man word. Any context. */
+static __inline__ plc_image_u64 plc_image_control(const plc_image* image) {
+  return __atomic_load_n(&image->header->control, __ATOMIC_ACQUIRE);
+}
+
+/* PLC_IMAGE_STATE_..., as the writer told it last, or the manager for it. Any context. */
+static __inline__ unsigned int plc_image_state(const plc_image* image) {
+  return (unsigned int)(plc_image_control(image) & PLC_IMAGE_STATE);
+}
+
+/* Copies the image that is shown to `bytes`, image->size of them: the latest, or the safe one. PLC_IMAGE_...;
+ * `stamp_ns` may be null. Unless it says PLC_IMAGE_OK, what is in `bytes` may be half of another image. A few
+ * attempts, then it gives up: real-time. */
 static __inline__ int plc_image_read(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
   int attempt;
   for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
-    const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE);
-    if (latest == 0) return PLC_IMAGE_NONE;
-    if (plc_image_copy(image, latest, bytes, stamp_ns)) return PLC_IMAGE_OK;
+    const int safe = (plc_image_control(image) & PLC_IMAGE_SHOWS_SAFE) != 0;
+    const plc_image_u64 shown =
+        __atomic_load_n(safe ? &image->header->safe : &image->header->latest, __ATOMIC_ACQUIRE);
+    if (shown == 0) return PLC_IMAGE_NONE;
+    if (plc_image_copy(image, shown, bytes, stamp_ns)) return PLC_IMAGE_OK;
   }
   return PLC_IMAGE_BUSY;
+}
+
+/* An age that is beyond each limit: nothing was written, or a stranger has written it. */
+#define PLC_IMAGE_NEVER 0x7fffffffffffffffL
+
+static __inline__ plc_image_i64 plc_image_age_of(plc_image_i64 stamp_ns) {
+  const plc_image_i64 now = plc_image_now_ns();
+  return stamp_ns <= 0 || stamp_ns > now ? PLC_IMAGE_NEVER : now - stamp_ns;
+}
+
+/* Since the latest image was published, whatever is shown; or PLC_IMAGE_NEVER. Real-time. */
+static __inline__ plc_image_i64 plc_image_age_ns(const plc_image* image) {
+  int attempt;
+  for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
+    const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE);
+    const plc_image_slot* slot;
+    plc_image_i64 stamp_ns;
+    if (latest == 0 || (latest & 0xffu) >= PLC_IMAGE_SLOTS) break;
+    slot = plc_image_slot_at(image, (unsigned int)(latest & 0xffu));
+    stamp_ns = __atomic_load_n(&slot->stamp_ns, __ATOMIC_RELAXED);
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    if (__atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) == latest >> 8) return plc_image_age_of(stamp_ns);
+  }
+  return PLC_IMAGE_NEVER;
+}
+
+/* Since the last sign of the writer; or PLC_IMAGE_NEVER: it gives none. Real-time. */
+static __inline__ plc_image_i64 plc_image_heartbeat_age_ns(const plc_image* image) {
+  return plc_image_age_of(__atomic_load_n(&image->header->heartbeat_ns, __ATOMIC_RELAXED));
+}
+
+/* For the writer, beside plc_image_write: one process at a time. */
+
+/* Makes `bytes` the safe image. The one before is whole until then. Set-up. */
+static __inline__ void plc_image_set_safe(const plc_image* image, const void* bytes) {
+  const plc_image_u64 before = __atomic_load_n(&image->header->safe, __ATOMIC_RELAXED);
+  const unsigned int number = (before & 0xffu) == PLC_IMAGE_SLOTS ? PLC_IMAGE_SLOTS + 1u : PLC_IMAGE_SLOTS;
+  const plc_image_u64 sequence = plc_image_next_sequence(before);
+  plc_image_fill(image, number, sequence, bytes, plc_image_now_ns());
+  __atomic_store_n(&image->header->safe, sequence << 8 | number, __ATOMIC_RELEASE);
+}
+
+/* Tells a state; `safe`: from now on the safe image is shown, until plc_image_resume. The dead-man word then.
+ * Any context, beside plc_image_resume in other threads. */
+static __inline__ plc_image_u64 plc_image_tell(const plc_image* image, unsigned int state, int safe) {
+  plc_image_u64 before = __atomic_load_n(&image->header->control, __ATOMIC_RELAXED);
+  for (;;) {
+    const plc_image_u64 shows = safe ? PLC_IMAGE_SHOWS_SAFE : before & PLC_IMAGE_SHOWS_SAFE;
+    const plc_image_u64 after =
+        (before / PLC_IMAGE_ONE_CHANGE + 1u) * PLC_IMAGE_ONE_CHANGE | shows | (plc_image_u64)state;
+    if (__atomic_compare_exchange_n(&image->header->control, &before, after, 0, __ATOMIC_RELEASE,
+                                    __ATOMIC_RELAXED))
+      return after;
+  }
+}
+
+/* After plc_image_write: the images that are published are shown again, unless something else was told since
+ * `told`. Real-time. */
+static __inline__ void plc_image_resume(const plc_image* image, plc_image_u64 told) {
+  const plc_image_u64 running =
+      (told / PLC_IMAGE_ONE_CHANGE + 1u) * PLC_IMAGE_ONE_CHANGE | PLC_IMAGE_STATE_RUNNING;
+  (void)__atomic_compare_exchange_n(&image->header->control, &told, running, 0, __ATOMIC_RELEASE,
+                                    __ATOMIC_RELAXED);
+}
+
+/* A sign of the writer. Any context. */
+static __inline__ void plc_image_beat(const plc_image* image) {
+  __atomic_store_n(&image->header->heartbeat_ns, plc_image_now_ns(), __ATOMIC_RELAXED);
+}
+
+/* For the writer at its end, or another process after it. Any context. */
+static __inline__ void plc_image_end(const plc_image* image) {
+  (void)plc_image_tell(image, PLC_IMAGE_STATE_ENDED,
+                       __atomic_load_n(&image->header->on_end, __ATOMIC_RELAXED) != 0);
 }
 
 /* Changes with each publication. Any context. */
@@ -288,9 +404,10 @@ static __inline__ int plc_image_map(plc_image* image) {
 }
 
 /*
- * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno: EINVAL: no name, or size;
- * ENAMETOOLONG; EPROTO: there is another kind of memory, another size or version; EBUSY: it has a writer
- * already; those of open, ftruncate, posix_fallocate and mmap. Set-up.
+ * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno. EINVAL: no name, or size.
+ * ENAMETOOLONG. EPROTO: there is another kind of memory, another size, or the version of another header. Then
+ * remove the file while no program uses it. EBUSY: it has a writer already. Others: those of open, ftruncate,
+ * posix_fallocate and mmap. Set-up.
  */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
                                      plc_image* image) {

@@ -134,6 +134,7 @@ void ManagedInstance::remove() {
 }
 
 void ManagedInstance::resume() {
+  host_.end_outputs();
   if (use_configuration() && earlier_) earlier_->failed = false;
   if (application_ != config_.application) tell_boot_application();
   const EndCause cause = cause_of_beginning();

@@ -10,6 +10,7 @@
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/outputs_page.hpp"
 
 namespace plchost {
 
@@ -126,6 +127,7 @@ void ProcessHost::read_replies() {
 
 // The one place where an instance's exit is reaped. Its last report explains the exit, so it comes first.
 void ProcessHost::process_ended() {
+  end_outputs();  // first: machines wait for it
   read_reports();
   read_replies();
   end_session(*process_);
@@ -186,6 +188,10 @@ std::optional<InstanceRuntime> ProcessHost::runtime() {
     current = page_->runtime();
   }
   return current;
+}
+
+void ProcessHost::end_outputs() {
+  plchost::end_outputs(settings_.pool, settings_.name);
 }
 
 std::string ProcessHost::keep_lost_faults() {

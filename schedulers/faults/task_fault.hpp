@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
+#include <utility>
 
 #include "schedulers/settings/task_options.hpp"
 #include "shm/base/fault_record.hpp"
@@ -16,14 +18,20 @@ class FaultBoard {
  public:
   /// `notify`: an eventfd; -1: nobody is told.
   explicit FaultBoard(int notify = -1) noexcept : notify_(notify) {}
+  /// Called by halt(), in any context; empty: nobody. Set-up, before any task runs.
+  void tell(std::function<void()> halted) noexcept { told_ = std::move(halted); }
   /// From now on no task begins another cycle. Any context, signal handlers included.
-  void halt() noexcept { halted_.store(true, std::memory_order_relaxed); }
+  void halt() noexcept {
+    halted_.store(true, std::memory_order_relaxed);
+    if (told_) told_();
+  }
   [[nodiscard]] bool halted() const noexcept { return halted_.load(std::memory_order_relaxed); }
   /// A record is complete. Any context, signal handlers included.
   void notify() noexcept;
 
  private:
   int notify_;
+  std::function<void()> told_;
   std::atomic<bool> halted_{false};
 };
 

@@ -67,6 +67,7 @@ class Task {
   [[nodiscard]] TaskFault& fault() noexcept { return fault_; }
   [[nodiscard]] const TaskFault& fault() const noexcept { return fault_; }
   [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
+  [[nodiscard]] const FaultTrap& trap() const noexcept { return trap_; }
   /// The run that a task is ready for, as long as it is the same: a cycle that has begun, or a due one that
   /// has not.
   struct Demand {

@@ -14,6 +14,7 @@
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
+#include "shm/pages/outputs_page.hpp"
 #include "shm/pages/transition_ring.hpp"
 
 namespace plchost {
@@ -30,10 +31,10 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
     return memory->ends_with(kOfInstances) ? Owners::trusted : Owners::writers_of_pool;
   }
   const std::array names = {std::string(pool), host_page_name(pool), fmt::format("{}.posts", pool)};
-  const std::array beginnings = {instance_page_name(pool, ""),      instance_claim_name(pool, ""),
-                                 transition_ring_name(pool, ""),    log_ring_name(pool, ""),
-                                 fmt::format("{}.download.", pool), fmt::format("{}.wish.", pool),
-                                 fmt::format("{}.variables.", pool)};
+  const std::array beginnings = {instance_page_name(pool, ""),       instance_claim_name(pool, ""),
+                                 transition_ring_name(pool, ""),     log_ring_name(pool, ""),
+                                 fmt::format("{}.download.", pool),  fmt::format("{}.wish.", pool),
+                                 fmt::format("{}.variables.", pool), outputs_page_name(pool, "")};
   const bool ours =
       std::ranges::find(names, file) != names.end() ||
       std::ranges::any_of(beginnings, [&](const auto& begin) { return file.starts_with(begin); });

@@ -1,4 +1,4 @@
-// The slots of a process image: one writer, readers that are overtaken or not.
+// The slots of a process image: one writer, readers that are overtaken or not, and the safe image.
 
 #include <array>
 
@@ -12,8 +12,8 @@ using Image = std::array<plc_image_u64, 2>;
 constexpr unsigned kSize = sizeof(Image);
 
 struct Shared {
-  alignas(64)
-      std::array<char, sizeof(plc_image_header) + PLC_IMAGE_SLOTS * (sizeof(plc_image_slot) + 64)> bytes{};
+  alignas(64) std::array<char, sizeof(plc_image_header) + (PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) *
+                                                              (sizeof(plc_image_slot) + 64)> bytes{};
   plc_image image{};
 
   Shared() {
@@ -26,6 +26,10 @@ struct Shared {
   void write(plc_image_u64 value) {
     const Image image_of_value{value, value};
     plc_image_write(&image, image_of_value.data());
+  }
+  void set_safe(plc_image_u64 value) {
+    const Image image_of_value{value, value};
+    plc_image_set_safe(&image, image_of_value.data());
   }
   // The image that was read, 0 if none was.
   plc_image_u64 read() {
@@ -83,6 +87,85 @@ void a_writer_is_killed(Scene& scene) {
   scene.thread("reader", [&] { require(shared.read() != 0, "no image, although there always is one"); });
 }
 
+constexpr plc_image_u64 kSafe = 100;  // above all that are published
+
+// A task publishes, and its first image ends the safe state that it was armed with. A stop comes before that,
+// meanwhile, or after it.
+void a_task_is_stopped(Scene& scene) {
+  Shared& shared = make(scene);
+  shared.write(1);
+  shared.set_safe(kSafe);
+  const plc_image_u64 armed = plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+  scene.thread("task", [&shared, armed] {
+    shared.write(2);
+    plc_image_resume(&shared.image, armed);
+    shared.write(3);
+  });
+  const ThreadNumber control =
+      scene.thread("control", [&] { (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_EXCEPTION, 1); });
+  scene.thread("terminal",
+               [&] {
+                 require(shared.read() == kSafe, "an image of a task that was stopped");
+                 require(plc_image_state(&shared.image) == PLC_IMAGE_STATE_EXCEPTION, "another state");
+               },
+               {.after = static_cast<int>(control)});
+}
+
+// A terminal that sees the tasks run sees at least the image of the first cycle.
+void a_first_cycle(Scene& scene) {
+  Shared& shared = make(scene);
+  shared.write(1);
+  shared.set_safe(kSafe);
+  const plc_image_u64 armed = plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+  scene.thread("task", [&shared, armed] {
+    shared.write(2);
+    plc_image_resume(&shared.image, armed);
+  });
+  scene.thread("terminal", [&] {
+    const bool runs = plc_image_state(&shared.image) == PLC_IMAGE_STATE_RUNNING;
+    const plc_image_u64 seen = shared.read();
+    require(seen == 2 || (seen == kSafe && !runs), "an image from before the first cycle");
+  });
+}
+
+void a_safe_image_is_told(Scene& scene) {
+  Shared& shared = make(scene);
+  shared.write(1);
+  scene.thread("writer", [&] {
+    shared.set_safe(kSafe);
+    (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+  });
+  scene.thread("terminal", [&] { require(shared.read() != 0, "no safe image, although it is told"); });
+}
+
+// The last image that was published becomes the safe one. A writer that is killed meanwhile leaves the one or
+// the other, and the process that ends it the one that is to be shown then.
+void a_writer_is_killed_while_it_stops(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.limits({.kills = 1});
+  shared.set_safe(kSafe);
+  shared.write(1);
+  __atomic_store_n(&shared.image.header->on_end, 1U, __ATOMIC_RELAXED);
+  const ThreadNumber victim = scene.thread("victim",
+                                           [&] {
+                                             shared.set_safe(kSafe + 1);
+                                             (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+                                           },
+                                           {.may_be_killed = true});
+  scene.thread("manager",
+               [&] {
+                 plc_image_end(&shared.image);
+                 require(shared.read() >= kSafe, "no safe image after the end");
+                 require(plc_image_state(&shared.image) == PLC_IMAGE_STATE_ENDED, "another state");
+               },
+               {.after = static_cast<int>(victim)});
+  scene.thread("terminal", [&] {
+    const plc_image_u64 first = shared.read();
+    require(first != 0, "no image, although there always is one");
+    require(shared.read() >= first, "an older image than before");
+  });
+}
+
 }  // namespace
 }  // namespace plchost::models
 
@@ -91,5 +174,9 @@ int main(int argc, char** argv) {
   return run(argc, argv,
              {{"a_writer_and_two_readers", a_writer_and_two_readers},
               {"the_writer_goes_round", the_writer_goes_round},
-              {"a_writer_is_killed", a_writer_is_killed}});
+              {"a_writer_is_killed", a_writer_is_killed},
+              {"a_task_is_stopped", a_task_is_stopped},
+              {"a_first_cycle", a_first_cycle},
+              {"a_safe_image_is_told", a_safe_image_is_told},
+              {"a_writer_is_killed_while_it_stops", a_writer_is_killed_while_it_stops}});
 }

@@ -13,6 +13,7 @@
 #include "plc_process_image.h"
 
 #define CHANNELS 64
+#define HEARTBEATS_MS 500 /* an instance writes one every 100 ms */
 #define NS_PER_MS 1000000L
 #define NS_PER_S 1000000000L
 
@@ -32,7 +33,8 @@ typedef struct {
   unsigned long cycles;
   unsigned long images; /* different ones that were read */
   unsigned long busy;   /* readings that were overtaken each time */
-  int safe;             /* outputs are in their safe state, because the instance is silent */
+  unsigned int state;   /* of the instance: PLC_IMAGE_STATE_... */
+  int safe;             /* outputs are in their safe state */
 } figures_t;
 
 static volatile sig_atomic_t ending = 0;
@@ -84,18 +86,24 @@ static int open_image(const options_t* options, const char* direction, int acces
   return error;
 }
 
-/* The outputs of the PLC, or all off if it has not written them lately. */
+/* Nobody drives the outputs, nor has put them into their safe state: the process was killed and there is no
+ * manager, or it stands still. */
+static int is_silent(const options_t* options, const plc_image* image, unsigned int state) {
+  if (state == PLC_IMAGE_STATE_ENDED) return 0;
+  if (state == PLC_IMAGE_STATE_RUNNING) return plc_image_age_ns(image) > options->watchdog_ms * NS_PER_MS;
+  return plc_image_heartbeat_age_ns(image) > (options->watchdog_ms + HEARTBEATS_MS) * NS_PER_MS;
+}
+
+/* The outputs of the PLC, or all off if it is silent. While its tasks do not run, the image that is read is
+ * the safe one of its settings. */
 static void read_outputs(const options_t* options, const plc_image* image, channels_t* outputs,
                          figures_t* figures) {
   static plc_image_u64 last = 0;
-  static plc_image_i64 stamp_ns = 0;
   channels_t fresh;
-  plc_image_i64 fresh_ns = 0;
-  switch (plc_image_read(image, &fresh, &fresh_ns)) {
+  switch (plc_image_read(image, &fresh, NULL)) {
     case PLC_IMAGE_OK:
       if (plc_image_sequence(image) != last) ++figures->images;
       last = plc_image_sequence(image);
-      stamp_ns = fresh_ns;
       *outputs = fresh;
       break;
     case PLC_IMAGE_BUSY:
@@ -104,8 +112,12 @@ static void read_outputs(const options_t* options, const plc_image* image, chann
     default:
       break;
   }
-  figures->safe = plc_image_now_ns() - stamp_ns > options->watchdog_ms * NS_PER_MS;
-  if (figures->safe) memset(outputs, 0, sizeof *outputs);
+  figures->state = plc_image_state(image);
+  figures->safe = figures->state != PLC_IMAGE_STATE_RUNNING;
+  if (is_silent(options, image, figures->state)) {
+    figures->safe = 1;
+    memset(outputs, 0, sizeof *outputs);
+  }
 }
 
 /* Each input comes a quarter of the way nearer to its output. */
@@ -118,10 +130,15 @@ static void measure(const channels_t* outputs, channels_t* inputs) {
   }
 }
 
+static const char* name_of(unsigned int state) {
+  static const char* const names[] = {"not there", "running", "stopped", "in exception", "halted", "ended"};
+  return state < sizeof names / sizeof names[0] ? names[state] : "in an unknown state";
+}
+
 static void report(const channels_t* inputs, const channels_t* outputs, const figures_t* figures) {
   int i;
-  printf("cycles %lu, images %lu, busy %lu, %s; channel out/in:", figures->cycles, figures->images,
-         figures->busy, figures->safe ? "safe state" : "driven");
+  printf("cycles %lu, images %lu, busy %lu, PLC %s, %s; channel out/in:", figures->cycles, figures->images,
+         figures->busy, name_of(figures->state), figures->safe ? "safe state" : "driven");
   for (i = 0; i < 4; ++i) printf(" %u/%u", outputs->channel[i], inputs->channel[i]);
   printf("\n");
   fflush(stdout);

@@ -235,6 +235,7 @@ Result<std::string> Instance::make_tasks() {
       },
       .state_changed =
           [this](std::size_t index, bool running) {
+            if (!running) host_->areas().outputs().task_rests(index);
             const auto state = running ? PageTaskState::running : PageTaskState::stopped;
             const auto task = static_cast<std::uint32_t>(index);
             // A task that comes back too late has been in exception all the same.
@@ -243,6 +244,7 @@ Result<std::string> Instance::make_tasks() {
       // Not before: in the first phase of a stop the others run what is posted. Nor later: a task in its last
       // cycle does not.
       .to_park = [this](std::size_t index) { unbind(index); },
+      .halted = [this] { host_->areas().outputs().fail(); },
       .catch_faults = true,
   };
   PLCHOST_TRY_ASSIGN(tasks_,
@@ -293,6 +295,11 @@ void Instance::report_tick() {
 }
 
 void Instance::beat() {
+  // First: the rest may wait for a lock of the heap, which a task that was caught can hold.
+  host_->areas().outputs().beat([this](std::size_t index) {
+    const Task& task = tasks_->task(index);
+    return task.in_cycle() && !task.trap().parked();
+  });
   host_->write_messages();
   if (control_) control_->beat();
   if (values_) values_->beat();

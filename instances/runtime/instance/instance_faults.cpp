@@ -32,6 +32,7 @@ void Instance::serve_faults() {
     if (fault->whole_application) {
       enter_exception(reason);
     } else {
+      host_->areas().outputs().task_fails(fault->task);
       unbind(fault->task);  // nobody runs what is posted to it any more
     }
   }

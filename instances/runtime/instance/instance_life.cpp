@@ -42,6 +42,7 @@ Result<TaskSet::Prepared> Instance::prepare_start() {
 }
 
 void Instance::start(TaskSet::Prepared prepared, std::string_view why) {
+  host_->areas().outputs().arm();
   tasks_->start(std::move(prepared));
   host_->events().publish_bound(true);
   unbound_.assign(application_->tasks().size(), false);
@@ -69,7 +70,11 @@ void Instance::begin_stop(std::string_view why) {
 }
 
 Result<std::string> Instance::begin_single_cycle() {
-  PLCHOST_TRY(tasks_->begin_single_cycle(start_.settings.scheduler));
+  host_->areas().outputs().arm();
+  if (auto begun = tasks_->begin_single_cycle(start_.settings.scheduler); !begun) {
+    host_->areas().outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+    return std::unexpected(std::move(begun).error());
+  }
   single_cycle_ends_ = MonotonicClock::now() + start_.settings.stop.others;
   life_.go_to(ApplicationState::single_cycle, "single cycle");
   return {};
@@ -96,6 +101,7 @@ void Instance::advance() {
 
 void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
   if (stuck.empty()) {
+    host_->areas().outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
     const bool single = life_.state() == ApplicationState::single_cycle;
     life_.go_to(ApplicationState::stopped,
                 single ? "each task has run one cycle" : "all tasks are at the end of their cycles");
@@ -124,6 +130,7 @@ std::string Instance::time_out(std::size_t task) {
 }
 
 void Instance::enter_exception(const std::string& reason) {
+  host_->areas().outputs().put_safe(PLC_IMAGE_STATE_EXCEPTION);
   if (!life_.go_to(ApplicationState::exception, reason)) return;
   drop_change("the application that runs is in exception");
   tasks_->park_all();
@@ -179,6 +186,7 @@ Result<void> Instance::shut_down() {
     }
   }
   // Before its code is called once more: if that ends the process, nothing of ours is left behind.
+  if (host_) host_->areas().end_outputs();
   if (page_) {
     InstancePage::remove(options_.launch.pool, options_.launch.name);
     SymbolPage::remove(options_.launch.pool, options_.launch.name);

@@ -14,6 +14,7 @@
 #include "shm/base/system_call.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/files/registers.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -138,17 +139,11 @@ Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
 
 Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
   PLCHOST_TRY_ASSIGN(const auto fd, open_device(settings));
-  // Memory 0 of an uio device is mapped from its beginning, whatever is wanted of it.
-  const bool uio = settings.device.starts_with("/dev/uio");
-  const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  const std::uint64_t begin = uio ? 0 : settings.address / page * page;
-  const std::uint64_t size = settings.address + settings.size - begin;
-  void* const address = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd.get(),
-                               static_cast<off_t>(begin));
-  if (address == MAP_FAILED) return not_mapped(settings, "cannot be mapped", errno);
+  auto mapped = map_registers(fd.get(), settings.device, settings.address, settings.size);
+  if (!mapped) return not_mapped(settings, "cannot be mapped", mapped.error().system_errno);
   AreaMemory memory;
-  memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), size));
-  memory.bytes_ = memory.mapping_.bytes().subspan(settings.address - begin, settings.size);
+  memory.mapping_ = std::move(mapped->pages);
+  memory.bytes_ = mapped->bytes;
   memory.existed_ = true;
   if (!memory.mapping_.guarded()) {
     return not_mapped(settings, fmt::format("more than {} memories of others", MemoryGuard::kMost));

@@ -71,6 +71,10 @@ class Planner {
                                  wanted.bytes, left, settings.size, wanted.flags));
     }
     if (settings.object.empty()) return {};
+    if (settings.safe != SafeState::keep && !wanted.is_output()) {
+      return refused(settings, wanted.name,
+                     "is no output, but the Object has a SafeState, which is for outputs");
+    }
     const auto first = std::ranges::find(plan.blocks, &settings, &AreaBlock::settings);
     const DeclaredArea* const other = first == plan.blocks.end() ? nullptr : &areas_[first->areas.front()];
     if (other != nullptr && content_of(*other) != content_of(wanted)) {

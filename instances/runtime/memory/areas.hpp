@@ -13,15 +13,21 @@
 #include "instances/runtime/memory/area_memory.hpp"
 #include "instances/runtime/memory/area_plan.hpp"
 #include "instances/runtime/memory/declared_area.hpp"
+#include "instances/runtime/memory/output_registers.hpp"
 #include "instances/runtime/memory/retain_keeper.hpp"
+#include "instances/runtime/memory/safe_outputs.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
 #include "instances/runtime/memory/task_cycle.hpp"
 #include "instances/runtime/variables/force_list.hpp"
 #include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
+#include "shm/pages/outputs_page.hpp"
 #include "shm/pool/pool_room.hpp"
 
 namespace plchost {
+
+/// The bytes of the whole area; empty: they are kept.
+[[nodiscard]] std::vector<std::byte> safe_values(const AreaSettings& settings);
 
 /// The memory areas of one application.
 class Areas {
@@ -76,6 +82,11 @@ class Areas {
   /// RetainKeeper::problem(). Control thread.
   [[nodiscard]] std::string retain_problem() const { return keeper_ ? keeper_->problem() : std::string(); }
 
+  /// Of these areas, all that a terminal can see.
+  [[nodiscard]] SafeOutputs& outputs() noexcept { return *safe_outputs_; }
+  /// The end of the process: the outputs are safe, and nobody else has to put them there. Control thread.
+  void end_outputs() noexcept;
+
   /// plc_area_address, plc_get_area_state. Any context.
   [[nodiscard]] void* address(RTS_HANDLE area) const noexcept;
   [[nodiscard]] RTS_RESULT state(RTS_HANDLE area, Plc_Area_State& state) const noexcept;
@@ -84,8 +95,9 @@ class Areas {
   /// The memory of a block of the plan, and what lies in it.
   struct Block {
     AreaMemory memory;
-    std::unique_ptr<OutputImage> outputs;  ///< null: no image is published
-    std::optional<plc_image> inputs;       ///< nothing: no image is read
+    std::unique_ptr<OutputImage> outputs;        ///< null: no image is published
+    std::unique_ptr<OutputRegisters> registers;  ///< null: no outputs of a device
+    std::optional<plc_image> inputs;             ///< nothing: no image is read
     std::vector<std::byte> initial;
     std::string source;  ///< the setting that placed it, and what it names
     bool loss_told = false;
@@ -110,11 +122,17 @@ class Areas {
   [[nodiscard]] Result<void> make_memory(const Environment& environment, Block& block,
                                          const AreaBlock& planned);
   void make_image(Block& block, const AreaBlock& planned);
+  // areas_outputs.cpp
+  [[nodiscard]] Result<void> make_outputs_page(const Environment& environment);
+  void make_registers(Block& block, const AreaBlock& planned);
+  [[nodiscard]] std::vector<ByteRange> ranges_of(const AreaBlock& planned) const;
+  [[nodiscard]] std::vector<ByteRange> written_alone(std::size_t index, std::size_t task) const;
+  void make_safe_outputs();
   [[nodiscard]] Result<void> make_keeper(const Environment& environment);
   void tell_plain_addresses();
   void make_views(std::size_t index);
   void make_view(std::size_t index, std::size_t task, bool sole);
-  [[nodiscard]] OutputView::Writes writes_of(std::size_t index, std::size_t task) const;
+  [[nodiscard]] OutputView::Writes writes_of(std::size_t index, std::size_t task, bool image) const;
   [[nodiscard]] std::vector<std::size_t> users_of(std::size_t index) const;
   void tell_view(std::size_t index, std::size_t task, std::byte* bytes);
   void count_cycles(std::span<const TaskConfig> tasks);
@@ -135,6 +153,9 @@ class Areas {
   std::unique_ptr<RetainKeeper> keeper_;
   std::deque<Of<InputView>> inputs_;
   std::deque<Of<OutputView>> outputs_;
+  std::vector<std::size_t> output_tasks_;  // of each of them
+  std::optional<OutputsPage> outputs_page_;
+  std::unique_ptr<SafeOutputs> safe_outputs_ = std::make_unique<SafeOutputs>();
   std::deque<TaskCycle> cycles_;   // of each task
   std::vector<std::byte*> plain_;  // addresses of areas that are the same for all
 };

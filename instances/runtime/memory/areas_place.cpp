@@ -164,15 +164,19 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
   // All steps that can fail come before anything is written that others see.
   auto made = make_blocks(environment);
   if (made) made = make_keeper(environment);
+  if (made) made = make_outputs_page(environment);
   if (!made) {
     blocks_.clear();  // with all that they have made in the pool
     return std::unexpected(std::move(made).error());
   }
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (first_of(plan_.blocks[i]).has_image()) make_image(blocks_[i], plan_.blocks[i]);
+    if (!first_of(plan_.blocks[i]).has_image()) continue;
+    make_image(blocks_[i], plan_.blocks[i]);
+    make_registers(blocks_[i], plan_.blocks[i]);
   }
   tell_plain_addresses();
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
+  make_safe_outputs();
   count_cycles(tasks);
   wrap(tasks, environment.forces);
   placed_ = true;
@@ -240,7 +244,8 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
     block.inputs = image_in(block.memory.bytes(), size);
   } else {
     block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
-    block.outputs->write(block.initial);
+    if (planned.settings == nullptr) return block.outputs->write(block.initial);
+    block.outputs->begin(block.initial, safe_values(*planned.settings));
   }
 }
 
@@ -292,7 +297,7 @@ std::vector<std::size_t> Areas::users_of(std::size_t index) const {
   return users;
 }
 
-OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task) const {
+OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task, bool image) const {
   OutputView::Writes writes;
   for (const std::size_t area : plan_.blocks[index].areas) {
     const DeclaredArea& declared = declared_[area];
@@ -301,10 +306,13 @@ OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task) const {
     bool uses = false;
     for (const AreaUse& use : declared.uses) {
       const ByteRange range{.offset = place + use.offset, .bytes = use.bytes};
-      if (range.bytes > 0) owned.push_back(range);
+      // In an image only this task's bytes are there, changed or not.
+      const bool whole = image && declared.uses.size() == 1;
+      const ByteRange owns = whole ? ByteRange{.offset = place, .bytes = declared.bytes} : range;
+      if (owns.bytes > 0) owned.push_back(owns);
       if (task_number(use.task) != task) continue;
       uses = true;
-      if (range.bytes > 0) writes.own.push_back(range);
+      if (owns.bytes > 0) writes.own.push_back(owns);
     }
     if (!uses) continue;
     for (const ByteRange range : rest_of({.offset = place, .bytes = declared.bytes}, owned)) {
@@ -330,10 +338,11 @@ void Areas::make_view(std::size_t index, std::size_t task, bool sole) {
     cycles_[task].add(view);
     tell_view(index, task, view.bytes());
   } else {
-    OutputView::Writes writes = writes_of(index, task);
+    OutputView::Writes writes = writes_of(index, task, !registers);
     writes.sole = sole && !registers;
+    output_tasks_.push_back(task);
     auto& view =
-        registers ? outputs_.emplace_back(index, block.initial, std::move(writes), block.memory.bytes()).view
+        registers ? outputs_.emplace_back(index, block.initial, std::move(writes), *block.registers).view
                   : outputs_.emplace_back(index, block.initial, std::move(writes), block.outputs.get()).view;
     cycles_[task].add(view);
     tell_view(index, task, view.bytes());

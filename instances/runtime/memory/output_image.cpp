@@ -1,6 +1,9 @@
 #include "instances/runtime/memory/output_image.hpp"
 
 #include <algorithm>
+#include <cstring>
+
+#include <unistd.h>
 
 namespace plchost {
 
@@ -11,6 +14,64 @@ plc_image image_in(std::span<std::byte> bytes, std::uint32_t size) noexcept {
   image.size = size;
   image.descriptor = -1;
   return image;
+}
+
+// Killed at any instruction in here, readers have one of the two images, whole.
+void OutputImage::begin(std::span<const std::byte> initial, std::span<const std::byte> safe) {
+  safe_.assign(safe.begin(), safe.end());
+  shown_.assign(initial.begin(), initial.end());
+  scratch_.resize(initial.size());
+  if (!keeps()) {
+    shown_ = safe_;
+  } else if (plc_image_read(&image_, scratch_.data(), nullptr) == PLC_IMAGE_OK) {
+    shown_ = scratch_;
+  }
+  __atomic_store_n(&image_.header->writer, static_cast<plc_image_u64>(::getpid()), __ATOMIC_RELAXED);
+  plc_image_set_safe(&image_, shown_.data());
+  (void)plc_image_tell(&image_, PLC_IMAGE_STATE_STOPPED, 1);
+  __atomic_store_n(&image_.header->on_end, keeps() ? 0U : 1U, __ATOMIC_RELAXED);
+  plc_image_beat(&image_);
+  write(initial);
+}
+
+void OutputImage::put_safe(unsigned state) noexcept {
+  told_.store(0, std::memory_order_relaxed);
+  bool have = !keeps() || shows_safe();
+  for (int attempt = 0; attempt < kAttempts && !have; ++attempt) {
+    const std::uint64_t latest = load();
+    if (plc_image_copy(&image_, latest, shown_.data(), nullptr) == 0) continue;
+    plc_image_set_safe(&image_, shown_.data());
+    have = true;
+  }
+  // An image that cannot be read, because a stranger has spoiled it, cannot be kept either.
+  (void)plc_image_tell(&image_, state, have ? 1 : 0);
+}
+
+void OutputImage::fail() noexcept {
+  told_.store(0, std::memory_order_relaxed);
+  (void)plc_image_tell(&image_, PLC_IMAGE_STATE_EXCEPTION, keeps() ? 0 : 1);
+}
+
+void OutputImage::reserve(std::span<const ByteRange> ranges) noexcept {
+  if (shows_safe() && plc_image_read(&image_, shown_.data(), nullptr) == PLC_IMAGE_OK)
+    (void)put_into(shown_, ranges);
+}
+
+bool OutputImage::put_safe_bytes(std::span<const ByteRange> ranges) noexcept {
+  return keeps() || put_into(safe_, ranges);
+}
+
+bool OutputImage::put_into(std::span<const std::byte> from, std::span<const ByteRange> ranges) noexcept {
+  return ranges.empty() || merge(scratch_, [&](std::span<std::byte> target) {
+           for (const ByteRange range : ranges)
+             std::memcpy(target.data() + range.offset, from.data() + range.offset, range.bytes);
+         });
+}
+
+// A state that another one has told meanwhile stays: a fault, say.
+void OutputImage::resume(std::uint64_t told) noexcept {
+  plc_image_resume(&image_, told);
+  told_.compare_exchange_strong(told, 0, std::memory_order_relaxed);
 }
 
 // The slot that was published longest ago, of those that nobody fills: readers have the most time.

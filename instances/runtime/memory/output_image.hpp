@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "instances/runtime/memory/byte_range.hpp"
 #include "shm/plc_process_image.h"
 
 namespace plchost {
@@ -15,7 +16,9 @@ namespace plchost {
 
 /// The image that several tasks of this process publish into, none of which waits for another: each makes a
 /// whole image of the latest one and its own bytes, and is too late if another one has published meanwhile;
-/// then it does it again. All functions are real-time.
+/// then it does it again. Tasks publish as they do, whatever readers are shown: begin() and put_safe() show
+/// them the safe image, and the first publication after arm() shows them the tasks' ones again. All functions
+/// are real-time, unless they say something else.
 class OutputImage {
  public:
   /// `memory` is an image already, and outlives this. Nobody else writes into it.
@@ -25,6 +28,28 @@ class OutputImage {
 
   [[nodiscard]] const plc_image& image() const noexcept { return image_; }
   [[nodiscard]] std::uint32_t size() const noexcept { return image_.size; }
+
+  /// Takes the image over from the process before, whatever that has left. Readers are shown the safe image:
+  /// `safe`, or if that is empty, what they were shown before, and `initial` if that was nothing. Publishes
+  /// `initial`. Set-up, once.
+  void begin(std::span<const std::byte> initial, std::span<const std::byte> safe);
+  /// From now on readers are shown the safe image, or the last one that was published if they are to keep
+  /// that. Later publications are not shown. Control thread.
+  void put_safe(unsigned state) noexcept;
+  /// Of put_safe() the part that needs nothing but atomic operations. To be followed by that. Any context,
+  /// signal handlers included.
+  void fail() noexcept;
+  /// Puts the bytes that are shown now into the next images, until the task that writes them has published.
+  /// Control thread, while all tasks are parked.
+  void reserve(std::span<const ByteRange> ranges) noexcept;
+  /// The next publication ends put_safe(). Control thread, while all tasks are parked.
+  void arm() noexcept { told_.store(plc_image_control(&image_), std::memory_order_relaxed); }
+  /// Puts safe bytes into the images that are published. false: others were faster too often. Control thread.
+  [[nodiscard]] bool put_safe_bytes(std::span<const ByteRange> ranges) noexcept;
+  /// After each publication.
+  void published() noexcept {
+    if (const std::uint64_t told = told_.load(std::memory_order_relaxed); told != 0) resume(told);
+  }
 
   /// Publishes `bytes`. For a sole writer.
   void write(std::span<const std::byte> bytes) noexcept { plc_image_write(&image_, bytes.data()); }
@@ -59,7 +84,18 @@ class OutputImage {
   [[nodiscard]] bool copy(std::uint64_t latest, std::span<std::byte> scratch) const noexcept;
   [[nodiscard]] bool publish(std::uint64_t latest, unsigned slot, std::span<const std::byte> bytes) noexcept;
 
+  void resume(std::uint64_t told) noexcept;
+  bool put_into(std::span<const std::byte> from, std::span<const ByteRange> ranges) noexcept;
+  [[nodiscard]] bool keeps() const noexcept { return safe_.empty(); }
+  [[nodiscard]] bool shows_safe() const noexcept {
+    return (plc_image_control(&image_) & PLC_IMAGE_SHOWS_SAFE) != 0;
+  }
+
   plc_image image_;
+  std::vector<std::byte> safe_;   // empty: the last values are kept
+  std::vector<std::byte> shown_;  // of the control thread
+  std::vector<std::byte> scratch_;
+  std::atomic<std::uint64_t> told_{0};     // the dead-man word that the next publication ends; 0: none
   std::atomic<std::uint32_t> claimed_{0};  // slots that tasks of this process fill; pairs with itself
 };
 

@@ -8,55 +8,11 @@ namespace plchost {
 
 namespace {
 
-constexpr std::size_t kWord = sizeof(std::uint32_t);
-
-bool is_aligned(const void* address) noexcept {
-  return reinterpret_cast<std::uintptr_t>(address) % kWord == 0;
-}
-
-// Registers have effects when they are touched: each access is made as it is written here.
-void read_word(std::byte* to, const std::byte* from) noexcept {
-  const std::uint32_t word = *reinterpret_cast<const volatile std::uint32_t*>(from);
-  std::memcpy(to, &word, kWord);
-}
-void write_word(std::byte* to, const std::byte* from) noexcept {
-  std::uint32_t word = 0;
-  std::memcpy(&word, from, kWord);
-  *reinterpret_cast<volatile std::uint32_t*>(to) = word;
-}
-void read_byte(std::byte* to, const std::byte* from) noexcept {
-  *to = *const_cast<const volatile std::byte*>(from);
-}
-void write_byte(std::byte* to, const std::byte* from) noexcept {
-  *const_cast<volatile std::byte*>(to) = *from;
-}
-
-template <class Word, class Byte>
-void copy_aligned(std::byte* to, const std::byte* from, std::size_t bytes, const void* registers,
-                  const Word& word, const Byte& byte) noexcept {
-  std::size_t at = 0;
-  const auto begin = static_cast<const std::byte*>(registers);
-  while (at < bytes && !is_aligned(begin + at)) {
-    byte(to + at, from + at);
-    ++at;
-  }
-  for (; at + kWord <= bytes; at += kWord) word(to + at, from + at);
-  for (; at < bytes; ++at) byte(to + at, from + at);
-}
-
 std::span<std::byte> part(std::span<std::byte> all, ByteRange range) noexcept {
   return all.subspan(range.offset, range.bytes);
 }
 
 }  // namespace
-
-void copy_from_registers(std::span<std::byte> to, std::span<const std::byte> registers) noexcept {
-  copy_aligned(to.data(), registers.data(), to.size(), registers.data(), read_word, read_byte);
-}
-
-void copy_to_registers(std::span<std::byte> registers, std::span<const std::byte> from) noexcept {
-  copy_aligned(registers.data(), from.data(), from.size(), registers.data(), write_word, write_byte);
-}
 
 InputView::InputView(std::vector<std::byte> initial, const plc_image* source)
     : bytes_(std::move(initial)), scratch_(bytes_.size()), image_(source) {}
@@ -84,8 +40,8 @@ OutputView::OutputView(std::vector<std::byte> initial, Writes writes, OutputImag
       writes_(std::move(writes)),
       image_(image) {}
 
-OutputView::OutputView(std::vector<std::byte> initial, Writes writes, std::span<std::byte> registers)
-    : bytes_(std::move(initial)), base_(bytes_), writes_(std::move(writes)), registers_(registers) {}
+OutputView::OutputView(std::vector<std::byte> initial, Writes writes, OutputRegisters& registers)
+    : bytes_(std::move(initial)), base_(bytes_), writes_(std::move(writes)), registers_(&registers) {}
 
 // All but its own bytes, of which it knows more than anybody.
 void OutputView::refresh() noexcept {
@@ -118,19 +74,29 @@ void OutputView::lay_over(std::span<std::byte> target) const noexcept {
 }
 
 void OutputView::end_cycle() noexcept {
-  if (image_ != nullptr) {
-    if (writes_.sole) return image_->write(bytes_);
+  // Pairs with the seat of the task: either this sees it, or the task is seen within its cycle.
+  if (given_up_.load(std::memory_order_seq_cst)) return;
+  if (registers_ != nullptr) return write_registers();
+  if (image_ == nullptr) return;
+  if (writes_.sole) {
+    image_->write(bytes_);
+  } else {
     late_ = !image_->merge(scratch_, [this](std::span<std::byte> target) { lay_over(target); });
-    if (late_) missed_.store(missed() + 1, std::memory_order_relaxed);
-    return;
+    if (late_) return missed_.store(missed() + 1, std::memory_order_relaxed);
   }
-  if (registers_.empty()) return;
-  for (const ByteRange own : writes_.own) copy_to_registers(part(registers_, own), part(bytes_, own));
+  image_->published();
+}
+
+void OutputView::write_registers() noexcept {
+  if (registers_->off()) return;
+  for (const ByteRange own : writes_.own) registers_->write(own.offset, part(bytes_, own));
   for (const ByteRange shared : writes_.shared) {
     for (std::size_t at = shared.offset; at < shared.offset + shared.bytes; ++at) {
-      if (bytes_[at] != base_[at]) write_byte(&registers_[at], &bytes_[at]);
+      if (bytes_[at] != base_[at]) registers_->change(at, bytes_[at]);
     }
+    if (armed_) registers_->restore(shared);
   }
+  armed_ = false;
 }
 
 }  // namespace plchost

@@ -7,14 +7,9 @@
 #include <vector>
 
 #include "instances/runtime/memory/output_image.hpp"
+#include "instances/runtime/memory/output_registers.hpp"
 
 namespace plchost {
-
-/// Bytes of a block.
-struct ByteRange {
-  std::size_t offset = 0;
-  std::size_t bytes = 0;
-};
 
 /// The counter of a task's cycles: odd inside of one, even outside. In retain memory.
 using CycleCounter = std::atomic<std::uint64_t>;
@@ -53,7 +48,14 @@ class OutputView {
   };
   /// `image`: null: nobody reads them.
   OutputView(std::vector<std::byte> initial, Writes writes, OutputImage* image);
-  OutputView(std::vector<std::byte> initial, Writes writes, std::span<std::byte> registers);
+  /// `registers` outlive it.
+  OutputView(std::vector<std::byte> initial, Writes writes, OutputRegisters& registers);
+
+  /// Its next publication is its first one since the outputs were safe. Control thread, while the task is
+  /// parked.
+  void arm() noexcept { armed_ = true; }
+  /// From its next cycle on it publishes nothing more. Control thread.
+  void give_up() noexcept { given_up_.store(true, std::memory_order_seq_cst); }
 
   /// The outputs of other tasks are in its copy then.
   void begin_cycle() noexcept;
@@ -66,6 +68,7 @@ class OutputView {
 
  private:
   void refresh() noexcept;
+  void write_registers() noexcept;
   void lay_over(std::span<std::byte> target) const noexcept;
 
   std::vector<std::byte> bytes_;
@@ -73,13 +76,11 @@ class OutputView {
   std::vector<std::byte> scratch_;
   Writes writes_;
   OutputImage* image_ = nullptr;
-  std::span<std::byte> registers_;
+  OutputRegisters* registers_ = nullptr;
+  bool armed_ = false;
+  std::atomic<bool> given_up_{false};
   bool late_ = false;                     // the last cycle's are not out yet
   std::atomic<std::uint64_t> missed_{0};  // written by the task alone
 };
-
-/// Reads or writes registers in the widest aligned accesses up to 32 bit, each byte once. Real-time.
-void copy_from_registers(std::span<std::byte> to, std::span<const std::byte> registers) noexcept;
-void copy_to_registers(std::span<std::byte> registers, std::span<const std::byte> from) noexcept;
 
 }  // namespace plchost

@@ -69,6 +69,13 @@ struct TaskSettings {
   bool operator==(const TaskSettings&) const = default;
 };
 
+/// [SysMem] Area.N.SafeState: the outputs of an area while no task drives them.
+enum class SafeState : std::uint8_t {
+  keep,    ///< as they were put out last
+  zero,    ///< all bytes 0
+  values,  ///< given ones
+};
+
 /// [SysMem] Area.N: where application areas of these flags lie.
 struct AreaSettings {
   std::size_t number = 0;
@@ -77,7 +84,9 @@ struct AreaSettings {
   std::uint64_t size = 0;     ///< bytes
   std::string device;         ///< empty: `object` says where it is
   std::string object;         ///< a shared memory of the pool
-  std::string where;          ///< "line1.cfg:12", its first line
+  SafeState safe = SafeState::keep;
+  std::vector<std::byte> safe_values{};  ///< of SafeState::values: `size` bytes
+  std::string where;                     ///< "line1.cfg:12", its first line
   bool operator==(const AreaSettings&) const = default;
 };
 

@@ -255,6 +255,10 @@ std::string initial_value(const SettingKey& key) {
       key.value);
 }
 
+bool is_word(std::string_view text, std::string_view word) {
+  return lower(text) == lower(word);
+}
+
 Result<const SettingKey*> find_setting(std::string_view section, std::string_view name) {
   const auto found = std::ranges::find_if(all_setting_keys(), [&](const SettingKey& key) {
     return key.section == table_section(section) && is_named(key, name);

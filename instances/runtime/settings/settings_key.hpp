@@ -20,6 +20,8 @@ struct AreaDraft {
   std::string where;  ///< its first line
   std::optional<std::int64_t> flags, address, size;
   std::string device, object;
+  SafeState safe = SafeState::keep;
+  std::vector<std::byte> safe_values;
 };
 
 /// The targets of a row of the table.
@@ -131,6 +133,9 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< the beginning of 
 /// The section of the table that a section as written was meant to be: in another case, or with a typing
 /// error. Empty: it is another program's.
 [[nodiscard]] std::string_view meant_section(std::string_view section);
+
+/// In any case.
+[[nodiscard]] bool is_word(std::string_view text, std::string_view word);
 
 /// "1000", "0x3E8", or a literal of IEC 61131-3: "16#3E8", "8#17", "2#1111_0000". Nothing: no number.
 [[nodiscard]] std::optional<std::int64_t> integer_of(std::string_view text);

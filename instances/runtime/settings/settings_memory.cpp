@@ -1,6 +1,9 @@
 // [SysMem]: where the areas of an application lie. [Retain]: how its retain values are written.
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -24,6 +27,8 @@ constexpr std::size_t kLastArea = kMaxAreas - 1;
 // In the order of their enumerators.
 constexpr std::array<std::string_view, 3> kMismatches = {"Initialise", "Refuse", "Ignore"};
 static_assert(std::to_underlying(RetainMismatch::ignore) == 2);
+constexpr std::array<std::string_view, 2> kSafeWords = {"Keep", "Zero"};
+static_assert(std::to_underlying(SafeState::zero) == 1);
 
 AreaDraft& draft(const SettingsTarget& to, std::size_t number) {
   AreaDraft& area = to.areas[number];
@@ -66,9 +71,52 @@ bool set_object(const SettingsTarget& to, std::size_t number, std::string_view t
   return true;
 }
 
+constexpr std::size_t kMaxSafeValues = 4096;
+
+// 0x and two digits for each byte, in the order of their addresses.
+std::optional<std::vector<std::byte>> read_hexadecimal(std::string_view text) {
+  if (!text.starts_with("0x") && !text.starts_with("0X")) return std::nullopt;
+  text.remove_prefix(2);
+  if (text.empty() || text.size() % 2 != 0 || text.size() / 2 > kMaxSafeValues) return std::nullopt;
+  std::vector<std::byte> bytes;
+  for (std::size_t at = 0; at < text.size(); at += 2) {
+    const std::string_view digits = text.substr(at, 2);
+    std::uint8_t value = 0;
+    const auto read = std::from_chars(digits.begin(), digits.end(), value, 16);
+    if (read.ec != std::errc() || read.ptr != digits.end()) return std::nullopt;
+    bytes.push_back(std::byte{value});
+  }
+  return bytes;
+}
+
+bool set_safe_state(const SettingsTarget& to, std::size_t number, std::string_view text) {
+  AreaDraft& area = draft(to, number);
+  const auto word =
+      std::ranges::find_if(kSafeWords, [&](std::string_view one) { return is_word(text, one); });
+  auto bytes = read_hexadecimal(text);
+  if (word == kSafeWords.end() && !bytes) return false;
+  area.safe = bytes ? SafeState::values : static_cast<SafeState>(word - kSafeWords.begin());
+  area.safe_values = std::move(bytes).value_or(std::vector<std::byte>());
+  return true;
+}
+
 std::unexpected<Error> bad(std::size_t number, const AreaDraft& area, std::string_view what) {
   return failure(ErrorCode::invalid_argument,
                  fmt::format("{}: [SysMem] Area.{}: {}", area.where, number, what));
+}
+
+Result<void> check_safe_state(std::size_t number, const AreaDraft& area) {
+  if (area.safe != SafeState::keep && (*area.flags & (PLC_AREA_OUTPUT | PLC_AREA_USER)) == 0) {
+    return bad(
+        number, area,
+        fmt::format("has a SafeState, which is for outputs; its Flags {:#x} need 0x8, or bits of {:#x}",
+                    *area.flags, PLC_AREA_USER));
+  }
+  if (area.safe != SafeState::values || static_cast<std::int64_t>(area.safe_values.size()) == *area.size)
+    return {};
+  return bad(number, area,
+             fmt::format("SafeState gives {} bytes, Size is {}; allowed are Keep, Zero, and all {} bytes",
+                         area.safe_values.size(), *area.size, *area.size));
 }
 
 // The settings of one area must be complete.
@@ -86,12 +134,15 @@ Result<AreaSettings> check_area(std::size_t number, const AreaDraft& area) {
         "needs an Address in the device or file (Device, without it /dev/mem), or a shared memory of the "
         "pool (Object)");
   }
+  PLCHOST_TRY(check_safe_state(number, area));
   AreaSettings settings{.number = number,
                         .flags = static_cast<std::uint32_t>(*area.flags),
                         .address = static_cast<std::uint64_t>(area.address.value_or(0)),
                         .size = static_cast<std::uint64_t>(*area.size),
                         .device = area.device,
                         .object = area.object,
+                        .safe = area.safe,
+                        .safe_values = area.safe_values,
                         .where = area.where};
   if (settings.object.empty() && settings.device.empty()) settings.device = kDefaultDevice;
   return settings;
@@ -134,6 +185,13 @@ constexpr std::array kMemoryKeys = {
                .meaning = "shared memory of the pool that it is",
                .value = NumberedSetting{"name of a shared memory of the pool, 1 to 95 letters, digits, _ - .",
                                         set_object, kLastArea}},
+    SettingKey{.section = kMemory,
+               .name = "Area.N.SafeState",
+               .prefixed = true,
+               .meaning = "outputs while no task drives them; without it Keep",
+               .value = NumberedSetting{"Keep, Zero, or 0x and two hexadecimal digits for each of the Size "
+                                        "bytes, at most 4096",
+                                        set_safe_state, kLastArea}},
     SettingKey{.section = kMemory, .name = "Memlock", .prefixed = true},
     SettingKey{.section = kRetain,
                .name = "Directory",

@@ -20,6 +20,7 @@
 #include "instances/launch/launch_contract.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/pages/outputs_page.hpp"
 #include "shm/variables/symbol_page.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/receive_until.hpp"
@@ -52,6 +53,7 @@ Sandbox::~Sandbox() {
     InstancePage::remove(pool_, instance);
     TransitionRing::remove(pool_, instance);
     SymbolPage::remove(pool_, instance);
+    OutputsPage::remove(pool_, instance);
   }
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);

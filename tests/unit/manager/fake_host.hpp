@@ -39,6 +39,7 @@ class FakeHost : public InstanceHost {
   [[nodiscard]] std::string processor_taker() override { return taker; }
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
   [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
+  void end_outputs() override { ++ended_outputs; }
   void read_output() override {}
   [[nodiscard]] std::string last_line() const override { return said; }
 
@@ -58,6 +59,7 @@ class FakeHost : public InstanceHost {
   int spawn_errno = 0;
   bool can_send = true;
   std::string lost_fault;
+  int ended_outputs = 0;
   std::string said;
   int next_pid = 100;
 };

@@ -1,0 +1,104 @@
+#include "instances/runtime/memory/safe_outputs.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace plchost {
+
+void SafeOutputs::make(std::vector<Block> blocks, std::size_t tasks) {
+  blocks_ = std::move(blocks);
+  rests_.assign(tasks, true);
+  fails_.assign(tasks, false);
+}
+
+void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
+  const bool failed = failed_.load(std::memory_order_relaxed) && state != PLC_IMAGE_STATE_ENDED;
+  if (block.image != nullptr) return block.image->put_safe(failed ? PLC_IMAGE_STATE_EXCEPTION : state);
+  block.registers->put_safe();
+  block.unsettled = true;
+}
+
+void SafeOutputs::put_safe(unsigned state) noexcept {
+  armed_ = false;
+  if (state == PLC_IMAGE_STATE_EXCEPTION) failed_.store(true, std::memory_order_relaxed);
+  for (Block& block : blocks_) put_safe(block, state);
+}
+
+void SafeOutputs::fail() noexcept {
+  failed_.store(true, std::memory_order_relaxed);
+  for (const Block& block : blocks_) {
+    if (block.image != nullptr) {
+      block.image->fail();
+    } else {
+      block.registers->put_safe();
+    }
+  }
+}
+
+void SafeOutputs::arm() noexcept {
+  armed_ = true;
+  rests_.assign(rests_.size(), false);
+  for (Block& block : blocks_) {
+    block.unsettled = false;
+    for (const Writer& writer : block.writers) {
+      writer.view->arm();
+      if (block.image != nullptr && block.writers.size() > 1) block.image->reserve(writer.alone);
+    }
+    if (block.image != nullptr) {
+      block.image->arm();
+    } else {
+      block.registers->arm();
+    }
+  }
+}
+
+void SafeOutputs::task_rests(std::size_t task) noexcept {
+  if (task >= rests_.size()) return;
+  rests_[task] = true;
+  if (!armed_) return;
+  for (Block& block : blocks_) {
+    const bool writes = std::ranges::find(block.writers, task, &Writer::task) != block.writers.end();
+    if (writes && std::ranges::all_of(block.writers, [&](const Writer& one) { return rests_[one.task]; }))
+      put_safe(block, PLC_IMAGE_STATE_STOPPED);
+  }
+}
+
+void SafeOutputs::task_fails(std::size_t task) noexcept {
+  if (task >= fails_.size()) return;
+  fails_[task] = true;
+  for (Block& block : blocks_) {
+    const auto writer = std::ranges::find(block.writers, task, &Writer::task);
+    if (writer == block.writers.end()) continue;
+    writer->view->give_up();
+    if (block.writers.size() == 1) {
+      put_safe(block, PLC_IMAGE_STATE_EXCEPTION);
+    } else {
+      settle(block, [](std::size_t) { return true; });
+    }
+  }
+}
+
+void SafeOutputs::beat(const InCycle& in_cycle) noexcept {
+  for (Block& block : blocks_) {
+    if (block.image != nullptr) plc_image_beat(&block.image->image());
+    if (block.unsettled) settle(block, in_cycle);
+  }
+}
+
+// The look comes first: the last one that was within its cycle is written over after it.
+void SafeOutputs::settle(Block& block, const InCycle& in_cycle) noexcept {
+  block.unsettled = std::ranges::any_of(block.writers, [&](const Writer& writer) {
+    return (!armed_ || fails_[writer.task]) && in_cycle(writer.task);
+  });
+  if (block.image == nullptr && block.registers->off()) return block.registers->put_safe();
+  for (const Writer& writer : block.writers) {
+    if (!fails_[writer.task]) continue;
+    if (block.image == nullptr) {
+      block.registers->put_safe(writer.alone);
+    } else if (!block.image->put_safe_bytes(writer.alone)) {
+      block.unsettled = true;
+    }
+  }
+}
+
+}  // namespace plchost

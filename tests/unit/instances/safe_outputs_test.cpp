@@ -1,0 +1,343 @@
+// The safe state of outputs: its setting, what is shown when, and that tasks keep their values.
+#include <array>
+#include <cstring>
+#include <fstream>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/runtime/memory/area_plan.hpp"
+#include "shm/plc_process_image.h"
+#include "tests/support/whole_cycle.hpp"
+#include "tests/unit/instances/areas_under_test.hpp"
+
+namespace plchost {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using Words = std::array<std::uint32_t, 3>;
+
+std::string area_with(const std::string& safe, const std::string& size = "12") {
+  return "[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Object=io\nLinux.Area.0.Size=" + size +
+         "\nLinux.Area.0.SafeState=" + safe + "\n";
+}
+
+TEST(SafeStateSetting, IsAWordInAnyCaseOrTheBytesInOrder) {
+  EXPECT_EQ(parse_settings(area_with("Keep"), "l.cfg")->areas[0].safe, SafeState::keep);
+  EXPECT_EQ(parse_settings(area_with("zERO"), "l.cfg")->areas[0].safe, SafeState::zero);
+  const auto given = parse_settings(area_with("0x01fFa0", "3"), "l.cfg");
+  ASSERT_TRUE(given) << given.error().describe();
+  EXPECT_EQ(given->areas[0].safe, SafeState::values);
+  EXPECT_EQ(given->areas[0].safe_values,
+            (std::vector<std::byte>{std::byte{1}, std::byte{0xff}, std::byte{0xa0}}));
+  const auto most = parse_settings(area_with("0x" + std::string(8192, '5'), "4096"), "l.cfg");
+  ASSERT_TRUE(most) << most.error().describe();
+  EXPECT_EQ(most->areas[0].safe_values.size(), 4096U);
+}
+
+TEST(SafeStateSetting, IsRefusedWithLineAndAllowedValues) {
+  for (const std::string bad : {"Off", "0x", "0x123", "0x12g4", "12", "0x 12", "0x+1"}) {
+    const auto refused = parse_settings(area_with(bad), "l.cfg");
+    ASSERT_FALSE(refused) << bad;
+    EXPECT_THAT(refused.error().message,
+                AllOf(HasSubstr("l.cfg:5"), HasSubstr("Keep, Zero, or 0x and two hexadecimal digits")));
+  }
+  EXPECT_FALSE(parse_settings(area_with("0x" + std::string(8194, '5'), "4097"), "l.cfg"));
+  EXPECT_THAT(
+      parse_settings(area_with("0x1122"), "l.cfg").error().message,
+      AllOf(HasSubstr("l.cfg:2: [SysMem] Area.0"),
+            HasSubstr("SafeState gives 2 bytes, Size is 12; allowed are Keep, Zero, and all 12 bytes")));
+  EXPECT_THAT(parse_settings("[SysMem]\nLinux.Area.0.Flags=4\nLinux.Area.0.Object=io\nLinux.Area.0.Size=1\n"
+                             "Linux.Area.0.SafeState=Zero\n",
+                             "l.cfg")
+                  .error()
+                  .message,
+              HasSubstr("has a SafeState, which is for outputs; its Flags 0x4 need 0x8"));
+}
+
+/// An area of three words: one of each of two tasks, and one of neither.
+class SafeOutputsOfAreas : public AreasUnderTest {
+ protected:
+  ~SafeOutputsOfAreas() override { close(); }
+
+  void set_up(const std::string& safe, unsigned initial = 5) {
+    task("One", [this] {
+      words(one)[0] = value;
+      words(one)[2] = value + 2;
+    });
+    task("Two", [this] { words(two)[1] = value + 1; });
+    const Words initials{initial, initial, initial};
+    declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}}, nullptr, initials.data());
+    const auto placed = place_only(area_with(safe));
+    ASSERT_TRUE(placed) << placed.error().describe();
+    ASSERT_TRUE(sut.keep());
+    close();
+    ASSERT_EQ(plc_image_open(pool_.c_str(), "io", 12, PLC_IMAGE_READ, &terminal.emplace()), 0);
+  }
+  void close() {
+    if (terminal) plc_image_close(&*terminal);
+    terminal.reset();
+  }
+  static std::uint32_t* words(void* area) { return static_cast<std::uint32_t*>(area); }
+  void run(std::size_t task, unsigned with) {
+    value = with;
+    run_whole_cycle(tasks[task]);
+  }
+  [[nodiscard]] Words shown() const {
+    Words read{};
+    EXPECT_EQ(plc_image_read(&*terminal, read.data(), nullptr), PLC_IMAGE_OK);
+    return read;
+  }
+  [[nodiscard]] unsigned state() const { return plc_image_state(&*terminal); }
+
+  std::optional<plc_image> terminal;
+  void* one = nullptr;
+  void* two = nullptr;
+  unsigned value = 0;
+};
+
+TEST_F(SafeOutputsOfAreas, AreShownUntilTheFirstCycleAndOfATaskUntilItsOwn) {
+  set_up("Zero");
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(shown(), Words{});
+  sut.outputs().arm();
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(shown(), Words{}) << "no cycle has ended yet";
+  run(0, 10);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+  EXPECT_EQ(shown(), (Words{10, 0, 12}));
+  run(1, 20);
+  EXPECT_EQ(shown(), (Words{10, 21, 12}));
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(shown(), Words{});
+  sut.outputs().arm();
+  // The third word is of neither: it comes back with the first cycle of either, as it was.
+  run(1, 30);
+  EXPECT_EQ(shown(), (Words{0, 31, 12}));
+  run(0, 40);
+  EXPECT_EQ(shown(), (Words{40, 31, 42}));
+}
+
+TEST_F(SafeOutputsOfAreas, OfGivenValuesAreShownWhileADebuggerHaltsTheTasks) {
+  set_up("0x010000000200000003000000");
+  EXPECT_EQ(shown(), (Words{1, 2, 3}));
+  sut.outputs().arm();
+  run(0, 10);
+  EXPECT_EQ(shown(), (Words{10, 2, 12}));
+  sut.outputs().put_safe(PLC_IMAGE_STATE_HALTED);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_HALTED);
+  EXPECT_EQ(shown(), (Words{1, 2, 3}));
+  sut.outputs().arm();
+  run(0, 11);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+  EXPECT_EQ(shown(), (Words{11, 2, 13}));
+}
+
+TEST_F(SafeOutputsOfAreas, AreNotLeftByATaskThatComesBackAfterAFault) {
+  set_up("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().fail();
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(shown(), Words{}) << "without the control thread";
+  run(0, 11);
+  EXPECT_EQ(shown(), Words{});
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION) << "until a fresh process";
+  run(1, 12);
+  EXPECT_EQ(shown(), Words{});
+  sut.end_outputs();
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_ENDED);
+  EXPECT_EQ(shown(), Words{});
+}
+
+TEST_F(SafeOutputsOfAreas, ThatAreKeptDoNotChangeWhenATaskComesBack) {
+  set_up("Keep");
+  EXPECT_EQ(shown(), (Words{5, 5, 5})) << "initial values: the image is new";
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().fail();
+  sut.outputs().put_safe(PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(shown(), (Words{10, 5, 12}));
+  run(0, 11);
+  EXPECT_EQ(shown(), (Words{10, 5, 12}));
+}
+
+TEST_F(SafeOutputsOfAreas, BeginWithAFaultBeforeTheFirstCycleHasEnded) {
+  set_up("Zero");
+  sut.outputs().arm();
+  sut.outputs().fail();
+  run(0, 10);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(shown(), Words{});
+}
+
+TEST_F(SafeOutputsOfAreas, AreThoseBytesThatATaskAloneWritesIfItFailsAlone) {
+  set_up("0x010000000200000003000000");
+  sut.outputs().arm();
+  run(0, 10);
+  run(1, 20);
+  sut.outputs().task_fails(1);
+  EXPECT_EQ(shown(), (Words{10, 2, 12}));
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+  run(1, 30);
+  EXPECT_EQ(shown(), (Words{10, 2, 12})) << "it publishes no more";
+  run(0, 40);
+  EXPECT_EQ(shown(), (Words{40, 2, 42}));
+}
+
+TEST_F(SafeOutputsOfAreas, AreReachedWhenAllWhoWriteThemRest) {
+  set_up("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().task_rests(0);
+  EXPECT_EQ(shown(), (Words{10, 0, 12}));
+  sut.outputs().task_rests(1);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(shown(), Words{});
+}
+
+TEST_F(SafeOutputsOfAreas, OfAProcessThatLeftItsImageHalfWrittenAreTakenOver) {
+  set_up("Keep");
+  sut.outputs().arm();
+  run(0, 10);
+  // As a process leaves it that is killed while it makes its safe image.
+  const unsigned spare =
+      (terminal->header->safe & 0xffU) == PLC_IMAGE_SLOTS ? PLC_IMAGE_SLOTS + 1U : PLC_IMAGE_SLOTS;
+  plc_image_slot_at(&*terminal, spare)->sequence = 0;
+  ASSERT_EQ(shown(), (Words{10, 5, 12}));
+  OutputImage next(std::span(reinterpret_cast<std::byte*>(terminal->header), terminal->mapped), 12);
+  const Words initial{7, 7, 7};
+  next.begin(std::as_bytes(std::span(initial)), {});
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(shown(), (Words{10, 5, 12})) << "kept until its first cycle";
+  next.arm();
+  next.write(std::as_bytes(std::span(initial)));
+  next.published();
+  EXPECT_EQ(shown(), initial);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+}
+
+TEST_F(SafeOutputsOfAreas, AreRefusedInAnObjectOfOtherAreas) {
+  task("Main", [] {});
+  declare("data", PLC_AREA_MEMORY, 8);
+  const auto placed = place(
+      "[SysMem]\nLinux.Area.0.Flags=0x18\nLinux.Area.0.Object=io\nLinux.Area.0.Size=8\n"
+      "Linux.Area.0.SafeState=Zero\n");
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message, AllOf(HasSubstr("l.cfg:2: [SysMem] Area.0"), HasSubstr("area 'data'"),
+                                            HasSubstr("is no output")));
+}
+
+TEST_F(SafeOutputsOfAreas, TellTheAgesOfTheLastImageAndOfTheProcess) {
+  set_up("Zero");
+  EXPECT_LT(plc_image_age_ns(&*terminal), PLC_IMAGE_NEVER);
+  terminal->header->heartbeat_ns = 1;
+  EXPECT_GT(plc_image_heartbeat_age_ns(&*terminal), 1'000'000);
+  const plc_image_i64 before = plc_image_now_ns();
+  sut.outputs().beat([](std::size_t) { return false; });
+  EXPECT_GE(terminal->header->heartbeat_ns, before);
+  // A stranger's: none of them is young.
+  terminal->header->heartbeat_ns = plc_image_now_ns() + 1'000'000'000'000;
+  EXPECT_EQ(plc_image_heartbeat_age_ns(&*terminal), PLC_IMAGE_NEVER);
+  for (const std::uint64_t latest : {std::uint64_t{0}, std::uint64_t{0x1ff}, std::uint64_t{0x1103}}) {
+    terminal->header->latest = latest;
+    EXPECT_EQ(plc_image_age_ns(&*terminal), PLC_IMAGE_NEVER);
+  }
+}
+
+/// The same in registers, which a file plays.
+class SafeRegisters : public SafeOutputsOfAreas {
+ protected:
+  ~SafeRegisters() override { std::remove(file_.c_str()); }
+  void place_registers(const std::string& safe) {
+    std::ofstream(file_, std::ios::binary) << std::string(64, '\x07');
+    task("One", [this] {
+      words(one)[0] = value;
+      if (changes) words(one)[2] = value + 2;
+    });
+    task("Two", [this] { words(two)[1] = value + 1; });
+    declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}});
+    const auto placed = place_only(
+        fmt::format("[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Address=8\nLinux.Area.0.Device={}\n"
+                    "Linux.Area.0.Size=12\nLinux.Area.0.SafeState={}\n",
+                    file_, safe));
+    ASSERT_TRUE(placed) << placed.error().describe();
+    ASSERT_TRUE(sut.keep());
+  }
+  [[nodiscard]] Words in_file() const {
+    std::ifstream stream(file_, std::ios::binary);
+    stream.seekg(8);
+    Words read{};
+    stream.read(reinterpret_cast<char*>(read.data()), sizeof read);
+    return read;
+  }
+  std::string file_ = "/tmp/" + own_name("registers");
+  bool changes = true;
+};
+
+TEST_F(SafeRegisters, AreWrittenAtTheStartAndAtAStopAndComeBackAsTheyWere) {
+  place_registers("0x010000000200000003000000");
+  EXPECT_EQ(in_file(), (Words{1, 2, 3}));
+  run(0, 10);
+  EXPECT_EQ(in_file(), (Words{1, 2, 3})) << "nobody has started the tasks";
+  sut.outputs().arm();
+  run(0, 11);
+  EXPECT_EQ(in_file(), (Words{11, 2, 13}));
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(in_file(), (Words{1, 2, 3}));
+  sut.outputs().arm();
+  changes = false;
+  run(0, 12);
+  EXPECT_EQ(in_file(), (Words{12, 2, 13})) << "a word that nobody changes is as it was";
+}
+
+TEST_F(SafeRegisters, ThatATaskJustWritesAreWrittenOverOnceMore) {
+  place_registers("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().put_safe(PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(in_file(), Words{});
+  const auto write_late = [this] {
+    std::fstream stream(file_, std::ios::binary | std::ios::in | std::ios::out);
+    stream.seekp(8);
+    stream.write("late", 4);
+  };
+  write_late();
+  sut.outputs().beat([](std::size_t task) { return task == 0; });
+  EXPECT_EQ(in_file(), Words{}) << "task One is in its cycle yet";
+  write_late();
+  sut.outputs().beat([](std::size_t) { return false; });
+  EXPECT_EQ(in_file(), Words{});
+  write_late();
+  sut.outputs().beat([](std::size_t) { return false; });
+  EXPECT_NE(in_file(), Words{}) << "nobody of this process can have written that";
+}
+
+TEST_F(SafeRegisters, ThatAreKeptAreLeftAlone) {
+  place_registers("Keep");
+  EXPECT_EQ(in_file()[0], 0x07070707U) << "as they were";
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().fail();
+  run(0, 11);
+  EXPECT_EQ(in_file()[0], 10U);
+}
+
+TEST_F(SafeRegisters, OfATaskThatFailsAloneAreSafe) {
+  place_registers("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  run(1, 20);
+  sut.outputs().task_fails(1);
+  run(1, 30);
+  EXPECT_EQ(in_file(), (Words{10, 0, 12}));
+}
+
+}  // namespace
+}  // namespace plchost
