@@ -125,6 +125,29 @@ TEST(ModbusDevices, ASilentPlcsOutputsStayIfSo) {
   EXPECT_EQ(peer.holding(7), 99);
 }
 
+// The PLC says which outputs hold. They do as long as it gives signs, and after its end in any case.
+TEST(ModbusDevices, TheSafeStateOfAPlcIsNoSilence) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99;
+  })) << sut.log();
+  plant.show_safe(PLC_IMAGE_STATE_STOPPED, 7);
+  ASSERT_TRUE(eventually([&] {
+    plant.beat();
+    return peer.holding(7) == 7;
+  }));
+  EXPECT_TRUE(eventually([&] { return peer.holding(7) == 0; }));  // no sign any more
+  plant.show_safe(PLC_IMAGE_STATE_ENDED, 8);
+  ASSERT_TRUE(eventually([&] { return peer.holding(7) == 8; }));
+  const int requests = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
+  EXPECT_EQ(peer.holding(7), 8);
+}
+
 TEST(ModbusDevices, ADeviceThatVanishesIsGoneAndComesBack) {
   Plant plant;
   const HeldPort port;

@@ -79,6 +79,13 @@ void Plant::put_out(unsigned offset, std::uint16_t word) {
   plc_image_write(&outputs_, bytes.data());
 }
 
+void Plant::show_safe(unsigned state, std::uint16_t word) {
+  std::array<std::uint8_t, kSize> bytes{};
+  std::memcpy(bytes.data(), &word, sizeof word);
+  plc_image_set_safe(&outputs_, bytes.data());
+  (void)plc_image_tell(&outputs_, state, 1);
+}
+
 ModbusProgram::ModbusProgram(const Plant& plant, const std::string& config, std::string_view log)
     : log_file_(plant.file(std::string(log))) {
   posix_spawn_file_actions_t actions{};

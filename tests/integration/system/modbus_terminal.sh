@@ -115,7 +115,7 @@ start_manager $host
 until_true 40 state_is packer1 running
 produce 1
 
-echo "- the instance is stopped: the terminal's outputs become zero, and come back"
+echo "- the instance is stopped: the outputs of the terminal get the safe state of its settings, and come back"
 plcctl stop instance packer1
 until_true 40 register_is 0 0
 plcctl start instance packer1

@@ -86,8 +86,8 @@ LinkResult Device::write_output(Output& output) {
 // False: nothing is to be written.
 bool Device::outputs_of(const Output& output, MapValues& values) const {
   bool wanted = true;
-  output.image->look([&](std::span<const std::byte> bytes, Duration age) {
-    if (age < config_.silent_after) return values.read_from(*output.map, bytes);
+  output.image->look([&](std::span<const std::byte> bytes, Duration silence) {
+    if (silence < config_.silent_after) return values.read_from(*output.map, bytes);
     wanted = config_.when_silent == LossPolicy::zero;
   });
   return wanted;

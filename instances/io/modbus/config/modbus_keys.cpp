@@ -151,11 +151,12 @@ constexpr std::array kDeviceKeys = {
         "[[device]]", {.name = "gone_after_ms", .meaning = "age of the inputs at which `when_gone` applies"}),
     key<&DeviceConfig::when_silent, WordKey<kLossNames>>(
         "[[device]]", {.name = "when_silent",
-                       .meaning = "outputs of a PLC that writes no image, and at the end of this process: "
+                       .meaning = "outputs of a [silent](#safe-states) PLC, and at the end of this process: "
                                   "nothing more is sent, or zeros"}),
     key<&DeviceConfig::silent_after, AgeKey>(
-        "[[device]]",
-        {.name = "silent_after_ms", .meaning = "age of the outputs at which `when_silent` applies"}),
+        "[[device]]", {.name = "silent_after_ms",
+                       .meaning = "silence after which `when_silent` applies: longer than the interval of "
+                                  "each task that writes the outputs"}),
     key<&DeviceConfig::status_image, TextKey<ImageNameRule>>(
         "[[device]]",
         {.name = "status_image", .meaning = "input image that gets the [status](#status) of the device"}),
@@ -178,8 +179,9 @@ constexpr std::array kServerKeys = {
         "[server]", {.name = "idle_timeout_ms",
                      .meaning = "time for the next whole request, after which the connection is closed"}),
     key<&ServerConfig::silent_after, OptionalTimeKey>(
-        "[server]", {.name = "silent_after_ms",
-                     .meaning = "an output image that is older is answered with exception 4; 0: never"}),
+        "[server]",
+        {.name = "silent_after_ms",
+         .meaning = "outputs of a PLC that is silent for longer are answered with exception 4; 0: never"}),
 };
 
 constexpr std::array kMapKeys = {

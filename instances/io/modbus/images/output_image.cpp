@@ -1,5 +1,6 @@
 #include "instances/io/modbus/images/output_image.hpp"
 
+#include <algorithm>
 #include <chrono>
 
 namespace plchost::modbus {
@@ -7,6 +8,7 @@ namespace plchost::modbus {
 namespace {
 
 constexpr std::chrono::milliseconds kLookPause{500};
+constexpr Duration kHeartbeat = std::chrono::milliseconds(100);  // of an instance
 
 }  // namespace
 
@@ -19,10 +21,7 @@ Result<std::unique_ptr<OutputImage>> OutputImage::open(const std::string& pool, 
 // A reader that was overtaken keeps what it has.
 void OutputImage::refresh() {
   repair();
-  const auto stamp_ns = image_.read(fresh_);
-  if (!stamp_ns) return;
-  std::swap(bytes_, fresh_);
-  stamp_ns_ = *stamp_ns;
+  if (image_.read(fresh_)) std::swap(bytes_, fresh_);
 }
 
 void OutputImage::repair() {
@@ -34,11 +33,19 @@ void OutputImage::repair() {
   if (opened) image_ = std::move(*opened);  // else the age tells it
 }
 
-// Only a stranger writes a stamp of the future, or a negative one.
-Duration OutputImage::age() const noexcept {
-  const plc_image_i64 now_ns = plc_image_now_ns();
-  if (stamp_ns_ <= 0 || stamp_ns_ > now_ns) return Duration::max();
-  return Duration(now_ns - stamp_ns_);
+// As instances/examples/io_terminal does it. PLC_IMAGE_NEVER is Duration::max().
+Duration OutputImage::silence() const noexcept {
+  const plc_image* const image = &image_.image();
+  switch (plc_image_state(image)) {
+    case PLC_IMAGE_STATE_ENDED:
+      return Duration::zero();
+    case PLC_IMAGE_STATE_STOPPED:
+    case PLC_IMAGE_STATE_EXCEPTION:
+    case PLC_IMAGE_STATE_HALTED:
+      return std::max(Duration(plc_image_heartbeat_age_ns(image)) - kHeartbeat, Duration::zero());
+    default:
+      return Duration(plc_image_age_ns(image));
+  }
 }
 
 }  // namespace plchost::modbus

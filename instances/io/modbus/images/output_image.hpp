@@ -21,13 +21,14 @@ class OutputImage {
   [[nodiscard]] static Result<std::unique_ptr<OutputImage>> open(const std::string& pool,
                                                                  const std::string& name, std::uint32_t size);
 
-  /// Calls `look` with the latest bytes and their age. The age is that of the image; Duration::max(): none
-  /// was written yet. A process that writes an image and says more about itself would be asked here.
+  /// Calls `look` with the bytes that are shown and the time for which their writer is silent. It is silent
+  /// if it runs and publishes nothing, or gives no sign. One that has stopped or ended in order is not: it
+  /// says which outputs hold from then on. Duration::max(): nothing was written yet.
   template <class Look>
   void look(const Look& look) {
     const std::lock_guard lock(mutex_);
     refresh();
-    look(std::span<const std::byte>(bytes_), age());
+    look(std::span<const std::byte>(bytes_), silence());
   }
 
  private:
@@ -39,7 +40,7 @@ class OutputImage {
         fresh_(bytes_.size()) {}
   void refresh();
   void repair();
-  [[nodiscard]] Duration age() const noexcept;
+  [[nodiscard]] Duration silence() const noexcept;
 
   std::string pool_;
   std::string name_;
@@ -47,8 +48,7 @@ class OutputImage {
   ProcessImage image_;
   std::vector<std::byte> bytes_;
   std::vector<std::byte> fresh_;
-  plc_image_i64 stamp_ns_ = 0;  ///< 0: none yet
-  TimePoint looked_at_;         ///< whether the file is still there
+  TimePoint looked_at_;  ///< whether the file is still there
 };
 
 }  // namespace plchost::modbus

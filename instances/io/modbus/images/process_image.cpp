@@ -72,10 +72,4 @@ bool ProcessImage::gone() const {
   return guard_.lost() || plc_image_gone(&image_, pool_.c_str(), name_.c_str()) != 0;
 }
 
-std::optional<plc_image_i64> ProcessImage::read(std::span<std::byte> bytes) const noexcept {
-  plc_image_i64 stamp_ns = 0;
-  if (plc_image_read(&image_, bytes.data(), &stamp_ns) != PLC_IMAGE_OK) return std::nullopt;
-  return stamp_ns;
-}
-
 }  // namespace plchost::modbus

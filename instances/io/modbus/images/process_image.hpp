@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -27,8 +26,10 @@ class ProcessImage {
   /// The name leads to another file, or to none, or the file was cut short: open it anew.
   [[nodiscard]] bool gone() const;
   [[nodiscard]] const plc_image& image() const noexcept { return image_; }
-  /// The latest image, and when it was published. Nothing: none yet, or it was overtaken each time.
-  [[nodiscard]] std::optional<plc_image_i64> read(std::span<std::byte> bytes) const noexcept;
+  /// The image that is shown. False: none yet, or it was overtaken each time.
+  [[nodiscard]] bool read(std::span<std::byte> bytes) const noexcept {
+    return plc_image_read(&image_, bytes.data(), nullptr) == PLC_IMAGE_OK;
+  }
 
  private:
   ProcessImage(std::string pool, std::string name, const plc_image& image);
