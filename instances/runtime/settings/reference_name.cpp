@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
 #include "shm/pages/reference_clock.hpp"
 
@@ -11,11 +12,6 @@ namespace {
 
 constexpr std::string_view kPrefix = "ptp:";
 constexpr std::string_view kDevices = "/dev/";
-
-bool is_word(std::string_view text, std::string_view word) noexcept {
-  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-  return std::ranges::equal(text, word, {}, lower);
-}
 
 // A path outside of /dev, or one that leads out of it, is no device.
 bool is_device(std::string_view path) noexcept {
