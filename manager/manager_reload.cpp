@@ -40,6 +40,7 @@ void Manager::adopt_removed() {
       spdlog::warn("instance {}: runs and is not in the configuration any more; it runs until it is stopped",
                    name);
     } else {
+      end_outputs(config_.host.pool, name);
       wishes_.erase(name);
       transitions_.erase(name);
       remove_kept_settings(name);

@@ -25,13 +25,10 @@
  * The dead-man word tells what the writer does, also after its end: plc_image_state(). An instance has a safe
  * image beside its outputs ([SysMem] Linux.Area.n.SafeState). While no task drives the outputs,
  * plc_image_read gives the safe image: after a stop, a fault, a hit of a watchdog, and the end of the
- * process, which the manager tells. Without a manager nobody tells that: the writer is silent then. Firmware
- * looks at both ages:
+ * process. The instance tells all of them but its own SIGKILL, which the manager tells. If there is no
+ * manager either, or the instance stands still, nobody tells it. Firmware has a limit of its own for that:
  *
- *     silent = plc_image_heartbeat_age_ns(&outputs) > limit ||
- *              (plc_image_state(&outputs) == PLC_IMAGE_STATE_RUNNING && plc_image_age_ns(&outputs) > limit);
- *
- * An instance writes its heartbeat every 100 ms. After PLC_IMAGE_STATE_ENDED there is none.
+ *     if (plc_image_silence_ns(&outputs) > limit) ... its own safe state
  *
  * The file is a memory of the pool: an object like all others once anybody opens it by name there, or the
  * manager has looked, provided that its owner may write the pool.
@@ -86,6 +83,10 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 #define PLC_IMAGE_STATE_EXCEPTION 3u /* a fault or a watchdog */
 #define PLC_IMAGE_STATE_HALTED 4u    /* a debugger holds the tasks */
 #define PLC_IMAGE_STATE_ENDED 5u     /* the process has ended, in order or not */
+
+/* An instance gives a sign every 100 ms. While its tasks rest it is silent when five in a row are missing. */
+#define PLC_IMAGE_SIGN_NS 100000000L
+#define PLC_IMAGE_PATIENCE_NS (5 * PLC_IMAGE_SIGN_NS)
 
 /* The layout: this, then PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS slots, each a plc_image_slot and the bytes,
  * padded to 64. All zero but for the first four is an image into which nothing was written yet. */
@@ -226,6 +227,17 @@ static __inline__ unsigned int plc_image_state(const plc_image* image) {
   return (unsigned int)(plc_image_control(image) & PLC_IMAGE_STATE);
 }
 
+/* Copies the latest image, whatever is shown: for the tasks of the writer. Otherwise as plc_image_read. */
+static __inline__ int plc_image_read_latest(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
+  int attempt;
+  for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
+    const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE);
+    if (latest == 0) return PLC_IMAGE_NONE;
+    if (plc_image_copy(image, latest, bytes, stamp_ns)) return PLC_IMAGE_OK;
+  }
+  return PLC_IMAGE_BUSY;
+}
+
 /* Copies the image that is shown to `bytes`, image->size of them: the latest, or the safe one. PLC_IMAGE_...;
  * `stamp_ns` may be null. Unless it says PLC_IMAGE_OK, what is in `bytes` may be half of another image. A few
  * attempts, then it gives up: real-time. */
@@ -270,6 +282,26 @@ static __inline__ plc_image_i64 plc_image_heartbeat_age_ns(const plc_image* imag
   return plc_image_age_of(__atomic_load_n(&image->header->heartbeat_ns, __ATOMIC_RELAXED));
 }
 
+/* How long nobody has said which outputs hold; 0: the writer gives signs, or has told its end. While it runs
+ * this is the age of the latest image, so the limit must be longer than the interval of the tasks. While its
+ * tasks rest it is the time since the fifth sign that is missing. PLC_IMAGE_NEVER: nothing was written yet.
+ * Real-time. */
+static __inline__ plc_image_i64 plc_image_silence_ns(const plc_image* image) {
+  plc_image_i64 age_ns;
+  switch (plc_image_state(image)) {
+    case PLC_IMAGE_STATE_ENDED:
+      return 0;
+    case PLC_IMAGE_STATE_STOPPED:
+    case PLC_IMAGE_STATE_EXCEPTION:
+    case PLC_IMAGE_STATE_HALTED:
+      age_ns = plc_image_heartbeat_age_ns(image);
+      if (age_ns == PLC_IMAGE_NEVER) return age_ns;
+      return age_ns > PLC_IMAGE_PATIENCE_NS ? age_ns - PLC_IMAGE_PATIENCE_NS : 0;
+    default:
+      return plc_image_age_ns(image);
+  }
+}
+
 /* For the writer, beside plc_image_write: one process at a time. */
 
 /* Makes `bytes` the safe image. The one before is whole until then. Set-up. */
@@ -281,27 +313,29 @@ static __inline__ void plc_image_set_safe(const plc_image* image, const void* by
   __atomic_store_n(&image->header->safe, sequence << 8 | number, __ATOMIC_RELEASE);
 }
 
-/* Tells a state; `safe`: from now on the safe image is shown, until plc_image_resume. The dead-man word then.
- * Any context, beside plc_image_resume in other threads. */
-static __inline__ plc_image_u64 plc_image_tell(const plc_image* image, unsigned int state, int safe) {
-  plc_image_u64 before = __atomic_load_n(&image->header->control, __ATOMIC_RELAXED);
-  for (;;) {
-    const plc_image_u64 shows = safe ? PLC_IMAGE_SHOWS_SAFE : before & PLC_IMAGE_SHOWS_SAFE;
-    const plc_image_u64 after =
-        (before / PLC_IMAGE_ONE_CHANGE + 1u) * PLC_IMAGE_ONE_CHANGE | shows | (plc_image_u64)state;
-    if (__atomic_compare_exchange_n(&image->header->control, &before, after, 0, __ATOMIC_RELEASE,
-                                    __ATOMIC_RELAXED))
-      return after;
-  }
+/* Tells a state, and whether the safe image is shown, if nothing was told since `told`. 1: done. Any context.
+ */
+static __inline__ int plc_image_tell_since(const plc_image* image, plc_image_u64 told, unsigned int state,
+                                           int safe) {
+  const plc_image_u64 now = (told / PLC_IMAGE_ONE_CHANGE + 1u) * PLC_IMAGE_ONE_CHANGE |
+                            (safe ? PLC_IMAGE_SHOWS_SAFE : 0u) | (plc_image_u64)state;
+  return __atomic_compare_exchange_n(&image->header->control, &told, now, 0, __ATOMIC_RELEASE,
+                                     __ATOMIC_RELAXED);
+}
+
+/* Tells a state; `safe`: from now on the safe image is shown, until plc_image_resume. Any context, beside
+ * plc_image_resume in other threads. */
+static __inline__ void plc_image_tell(const plc_image* image, unsigned int state, int safe) {
+  plc_image_u64 told;
+  do {
+    told = plc_image_control(image);
+  } while (!plc_image_tell_since(image, told, state, safe || (told & PLC_IMAGE_SHOWS_SAFE) != 0));
 }
 
 /* After plc_image_write: the images that are published are shown again, unless something else was told since
  * `told`. Real-time. */
 static __inline__ void plc_image_resume(const plc_image* image, plc_image_u64 told) {
-  const plc_image_u64 running =
-      (told / PLC_IMAGE_ONE_CHANGE + 1u) * PLC_IMAGE_ONE_CHANGE | PLC_IMAGE_STATE_RUNNING;
-  (void)__atomic_compare_exchange_n(&image->header->control, &told, running, 0, __ATOMIC_RELEASE,
-                                    __ATOMIC_RELAXED);
+  (void)plc_image_tell_since(image, told, PLC_IMAGE_STATE_RUNNING, 0);
 }
 
 /* A sign of the writer. Any context. */
@@ -309,10 +343,20 @@ static __inline__ void plc_image_beat(const plc_image* image) {
   __atomic_store_n(&image->header->heartbeat_ns, plc_image_now_ns(), __ATOMIC_RELAXED);
 }
 
-/* For the writer at its end, or another process after it. Any context. */
-static __inline__ void plc_image_end(const plc_image* image) {
-  (void)plc_image_tell(image, PLC_IMAGE_STATE_ENDED,
-                       __atomic_load_n(&image->header->on_end, __ATOMIC_RELAXED) != 0);
+/* Begins to write, as process number `writer`: before anything is told. Set-up. */
+static __inline__ void plc_image_take(const plc_image* image, plc_image_u64 writer) {
+  __atomic_store_n(&image->header->writer, writer, __ATOMIC_RELAXED);
+}
+
+/* For another process: process number `writer` has ended without a word. 0: the next writer has taken the
+ * image already, and it is left alone. Any context. */
+static __inline__ int plc_image_end_of(const plc_image* image, plc_image_u64 writer) {
+  const plc_image_u64 told = plc_image_control(image);
+  const int safe =
+      (told & PLC_IMAGE_SHOWS_SAFE) != 0 || __atomic_load_n(&image->header->on_end, __ATOMIC_RELAXED) != 0;
+  /* After the word: the next writer takes the image before it tells one. */
+  if (__atomic_load_n(&image->header->writer, __ATOMIC_RELAXED) != writer) return 0;
+  return plc_image_tell_since(image, told, PLC_IMAGE_STATE_ENDED, safe);
 }
 
 /* Changes with each publication. Any context. */
@@ -403,6 +447,16 @@ static __inline__ int plc_image_map(plc_image* image) {
   return plc_image_is_one(image->header, image->size) ? 0 : EPROTO;
 }
 
+/* An instance may have had its outputs in the image of a writer that tells no state. */
+static __inline__ void plc_image_tell_nothing(const plc_image* image) {
+  plc_image_u64 told;
+  plc_image_take(image, (plc_image_u64)getpid());
+  __atomic_store_n(&image->header->on_end, 0u, __ATOMIC_RELAXED);
+  do {
+    told = plc_image_control(image);
+  } while (told != 0 && !plc_image_tell_since(image, told, PLC_IMAGE_STATE_UNTOLD, 0));
+}
+
 /*
  * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno. EINVAL: no name, or size.
  * ENAMETOOLONG. EPROTO: there is another kind of memory, another size, or the version of another header. Then
@@ -424,6 +478,7 @@ static __inline__ int plc_image_open(const char* pool, const char* name, unsigne
   if (access == PLC_IMAGE_WRITE && flock(image->descriptor, LOCK_EX | LOCK_NB) != 0)
     error = errno == EWOULDBLOCK ? EBUSY : errno;
   if (error == 0) error = plc_image_map(image);
+  if (error == 0 && access == PLC_IMAGE_WRITE) plc_image_tell_nothing(image);
   if (error != 0) plc_image_close(image);
   return error;
 }

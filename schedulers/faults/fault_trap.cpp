@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <csignal>
+#include <utility>
 
 #include <sys/eventfd.h>
 #include <sys/syscall.h>
@@ -21,6 +22,7 @@ namespace {
 constinit thread_local FaultTrap* armed = nullptr;
 constinit thread_local pid_t own_thread = 0;
 constinit std::atomic<bool> installed{false};
+constinit std::atomic<FaultBoard*> telling{nullptr};
 
 int watchdog_signal() noexcept {
   return SIGRTMAX - 1;
@@ -67,6 +69,20 @@ void crash(int signal, const siginfo_t& info) noexcept {
 }
 
 }  // namespace
+
+FaultBoard::~FaultBoard() {
+  FaultBoard* self = this;
+  telling.compare_exchange_strong(self, nullptr, std::memory_order_acq_rel);
+}
+
+void FaultBoard::tell(std::function<void()> halted) noexcept {
+  told_ = std::move(halted);
+  if (told_) telling.store(this, std::memory_order_release);
+}
+
+void FaultBoard::process_ends() noexcept {
+  if (FaultBoard* const board = telling.load(std::memory_order_acquire)) board->halt();
+}
 
 void FaultBoard::notify() noexcept {
   const std::uint64_t one = 1;
@@ -133,6 +149,7 @@ struct FaultHandlers {
       return;
     }
     if (armed == nullptr) {
+      FaultBoard::process_ends();
       crash(signal, *info);
       errno = saved;
       return;

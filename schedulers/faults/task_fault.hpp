@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <utility>
 
 #include "schedulers/settings/task_options.hpp"
 #include "shm/base/fault_record.hpp"
@@ -18,8 +17,14 @@ class FaultBoard {
  public:
   /// `notify`: an eventfd; -1: nobody is told.
   explicit FaultBoard(int notify = -1) noexcept : notify_(notify) {}
+  ~FaultBoard();
+  FaultBoard(const FaultBoard&) = delete;
+  FaultBoard& operator=(const FaultBoard&) = delete;
   /// Called by halt(), in any context; empty: nobody. Set-up, before any task runs.
-  void tell(std::function<void()> halted) noexcept { told_ = std::move(halted); }
+  void tell(std::function<void()> halted) noexcept;
+  /// A fault outside of the tasks ends the process: halts the board that was told last. Any context, signal
+  /// handlers included.
+  static void process_ends() noexcept;
   /// From now on no task begins another cycle. Any context, signal handlers included.
   void halt() noexcept {
     halted_.store(true, std::memory_order_relaxed);

@@ -99,9 +99,7 @@ Result<void> end_image(const std::string& pool, const std::string& name, std::in
                      plc_image_is_one(image.header, image.size) != 0 &&
                      plc_image_bytes(image.size) == image.mapped;
   if (!whole) return failure(ErrorCode::corrupt, "its header says that it is no image of this version");
-  // Another process writes it by now.
-  if (__atomic_load_n(&image.header->writer, __ATOMIC_RELAXED) != static_cast<std::uint64_t>(pid)) return {};
-  plc_image_end(&image);
+  (void)plc_image_end_of(&image, static_cast<plc_image_u64>(pid));
   return {};
 }
 
@@ -179,7 +177,9 @@ void end_outputs(std::string_view pool, std::string_view instance) {
     spdlog::warn("instance {}: outputs in {} are not put into their safe state: {}", instance,
                  entry.name.view(), ended.error().describe());
   }
-  MemoryFile::remove(name);
+  // Not that of a process that has begun meanwhile.
+  const auto now = MemoryFile::open(name, sizeof(OutputsLayout), MemoryFile::Access::read_only);
+  if (now && now->same_file(*memory)) MemoryFile::remove(name);
 }
 
 }  // namespace plchost

@@ -39,6 +39,8 @@ class OutputsPage {
   /// Removes it: the outputs are safe.
   ~OutputsPage();
 
+  /// It stays where it is: the outputs may be written once more before the process has ended.
+  void leave() noexcept { name_.clear(); }
   static void remove(std::string_view pool, std::string_view instance) noexcept;
 
  private:

@@ -10,6 +10,9 @@ namespace {
 
 using Image = std::array<plc_image_u64, 2>;
 constexpr unsigned kSize = sizeof(Image);
+constexpr plc_image_u64 kSafe = 100;  // above all that are published
+constexpr plc_image_u64 kVictim = 7;  // process numbers
+constexpr plc_image_u64 kSuccessor = 8;
 
 struct Shared {
   alignas(64) std::array<char, sizeof(plc_image_header) + (PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) *
@@ -30,6 +33,12 @@ struct Shared {
   void set_safe(plc_image_u64 value) {
     const Image image_of_value{value, value};
     plc_image_set_safe(&image, image_of_value.data());
+  }
+  // The word that was told.
+  plc_image_u64 stop() {
+    set_safe(kSafe);
+    plc_image_tell(&image, PLC_IMAGE_STATE_STOPPED, 1);
+    return plc_image_control(&image);
   }
   // The image that was read, 0 if none was.
   plc_image_u64 read() {
@@ -87,22 +96,19 @@ void a_writer_is_killed(Scene& scene) {
   scene.thread("reader", [&] { require(shared.read() != 0, "no image, although there always is one"); });
 }
 
-constexpr plc_image_u64 kSafe = 100;  // above all that are published
-
 // A task publishes, and its first image ends the safe state that it was armed with. A stop comes before that,
 // meanwhile, or after it.
 void a_task_is_stopped(Scene& scene) {
   Shared& shared = make(scene);
   shared.write(1);
-  shared.set_safe(kSafe);
-  const plc_image_u64 armed = plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+  const plc_image_u64 armed = shared.stop();
   scene.thread("task", [&shared, armed] {
     shared.write(2);
     plc_image_resume(&shared.image, armed);
     shared.write(3);
   });
   const ThreadNumber control =
-      scene.thread("control", [&] { (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_EXCEPTION, 1); });
+      scene.thread("control", [&] { plc_image_tell(&shared.image, PLC_IMAGE_STATE_EXCEPTION, 1); });
   scene.thread("terminal",
                [&] {
                  require(shared.read() == kSafe, "an image of a task that was stopped");
@@ -115,8 +121,7 @@ void a_task_is_stopped(Scene& scene) {
 void a_first_cycle(Scene& scene) {
   Shared& shared = make(scene);
   shared.write(1);
-  shared.set_safe(kSafe);
-  const plc_image_u64 armed = plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+  const plc_image_u64 armed = shared.stop();
   scene.thread("task", [&shared, armed] {
     shared.write(2);
     plc_image_resume(&shared.image, armed);
@@ -131,10 +136,7 @@ void a_first_cycle(Scene& scene) {
 void a_safe_image_is_told(Scene& scene) {
   Shared& shared = make(scene);
   shared.write(1);
-  scene.thread("writer", [&] {
-    shared.set_safe(kSafe);
-    (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
-  });
+  scene.thread("writer", [&] { (void)shared.stop(); });
   scene.thread("terminal", [&] { require(shared.read() != 0, "no safe image, although it is told"); });
 }
 
@@ -146,15 +148,16 @@ void a_writer_is_killed_while_it_stops(Scene& scene) {
   shared.set_safe(kSafe);
   shared.write(1);
   __atomic_store_n(&shared.image.header->on_end, 1U, __ATOMIC_RELAXED);
+  plc_image_take(&shared.image, kVictim);
   const ThreadNumber victim = scene.thread("victim",
                                            [&] {
                                              shared.set_safe(kSafe + 1);
-                                             (void)plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
+                                             plc_image_tell(&shared.image, PLC_IMAGE_STATE_STOPPED, 1);
                                            },
                                            {.may_be_killed = true});
   scene.thread("manager",
                [&] {
-                 plc_image_end(&shared.image);
+                 (void)plc_image_end_of(&shared.image, kVictim);
                  require(shared.read() >= kSafe, "no safe image after the end");
                  require(plc_image_state(&shared.image) == PLC_IMAGE_STATE_ENDED, "another state");
                },
@@ -163,6 +166,26 @@ void a_writer_is_killed_while_it_stops(Scene& scene) {
     const plc_image_u64 first = shared.read();
     require(first != 0, "no image, although there always is one");
     require(shared.read() >= first, "an older image than before");
+  });
+}
+
+// The manager ends the image of a killed process while the next one takes it: that one's word holds, and its
+// first cycle ends the safe state.
+void the_next_writer_comes_first(Scene& scene) {
+  Shared& shared = make(scene);
+  shared.write(1);
+  plc_image_take(&shared.image, kVictim);
+  plc_image_tell(&shared.image, PLC_IMAGE_STATE_RUNNING, 0);
+  __atomic_store_n(&shared.image.header->on_end, 1U, __ATOMIC_RELAXED);
+  shared.set_safe(kSafe);
+  scene.thread("manager", [&] { (void)plc_image_end_of(&shared.image, kVictim); });
+  scene.thread("successor", [&] {
+    plc_image_take(&shared.image, kSuccessor);
+    const plc_image_u64 armed = shared.stop();
+    require(plc_image_state(&shared.image) == PLC_IMAGE_STATE_STOPPED, "the state of the writer before");
+    shared.write(2);
+    plc_image_resume(&shared.image, armed);
+    require(shared.read() == 2, "outputs stay safe although a task drives them");
   });
 }
 
@@ -178,5 +201,6 @@ int main(int argc, char** argv) {
               {"a_task_is_stopped", a_task_is_stopped},
               {"a_first_cycle", a_first_cycle},
               {"a_safe_image_is_told", a_safe_image_is_told},
-              {"a_writer_is_killed_while_it_stops", a_writer_is_killed_while_it_stops}});
+              {"a_writer_is_killed_while_it_stops", a_writer_is_killed_while_it_stops},
+              {"the_next_writer_comes_first", the_next_writer_comes_first}});
 }

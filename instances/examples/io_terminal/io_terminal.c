@@ -13,7 +13,6 @@
 #include "plc_process_image.h"
 
 #define CHANNELS 64
-#define HEARTBEATS_MS 500 /* an instance writes one every 100 ms */
 #define NS_PER_MS 1000000L
 #define NS_PER_S 1000000000L
 
@@ -86,14 +85,6 @@ static int open_image(const options_t* options, const char* direction, int acces
   return error;
 }
 
-/* Nobody drives the outputs, nor has put them into their safe state: the process was killed and there is no
- * manager, or it stands still. */
-static int is_silent(const options_t* options, const plc_image* image, unsigned int state) {
-  if (state == PLC_IMAGE_STATE_ENDED) return 0;
-  if (state == PLC_IMAGE_STATE_RUNNING) return plc_image_age_ns(image) > options->watchdog_ms * NS_PER_MS;
-  return plc_image_heartbeat_age_ns(image) > (options->watchdog_ms + HEARTBEATS_MS) * NS_PER_MS;
-}
-
 /* The outputs of the PLC, or all off if it is silent. While its tasks do not run, the image that is read is
  * the safe one of its settings. */
 static void read_outputs(const options_t* options, const plc_image* image, channels_t* outputs,
@@ -114,7 +105,9 @@ static void read_outputs(const options_t* options, const plc_image* image, chann
   }
   figures->state = plc_image_state(image);
   figures->safe = figures->state != PLC_IMAGE_STATE_RUNNING;
-  if (is_silent(options, image, figures->state)) {
+  /* Nobody drives the outputs, nor has put them into their safe state: the process was killed and there is no
+   * manager, or it stands still. */
+  if (plc_image_silence_ns(image) > options->watchdog_ms * NS_PER_MS) {
     figures->safe = 1;
     memset(outputs, 0, sizeof *outputs);
   }

@@ -16,6 +16,7 @@
 #include "shm/base/names.hpp"
 #include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/outputs_page.hpp"
 
 namespace plchost {
 
@@ -128,6 +129,8 @@ void Instance::choose_scheduler() {
 
 Result<std::string> Instance::attach_pool() {
   PLCHOST_TRY_ASSIGN(name_claim_, claim_name(options_.launch));
+  // Of a process before this one that was killed while there was no manager.
+  end_outputs(options_.launch.pool, options_.launch.name);
   // Of a manager's instance the manager has made sure whose the pool is, and its owner can be a third user.
   const bool managed = options_.launch.report_fd >= 0;
   auto pool = managed ? ObjectPool::attach(options_.launch.pool) : ObjectPool::create(options_.launch.pool);

@@ -173,10 +173,12 @@ Result<void> Instance::shut_down() {
   drop_orders(ErrorCode::unavailable, "the process ends");
   log_ended_forces("the process ends");
   Result<void> stopped;
+  bool settled = true;
   if (tasks_) {
     tasks_->park_all();
     host_->events().publish_bound(false);
     const auto busy = tasks_->still_busy(MonotonicClock::now() + kParkPatience);
+    settled = busy.empty();
     parked_ = tasks_->has_parked_thread();  // also one that a watchdog caught after its stop had timed out
     if (busy.empty()) {
       notify_tasks(EVT_PrepareExternalEventTaskDelete);
@@ -186,7 +188,7 @@ Result<void> Instance::shut_down() {
     }
   }
   // Before its code is called once more: if that ends the process, nothing of ours is left behind.
-  if (host_) host_->areas().end_outputs();
+  if (host_) host_->areas().end_outputs(settled);
   if (page_) {
     InstancePage::remove(options_.launch.pool, options_.launch.name);
     SymbolPage::remove(options_.launch.pool, options_.launch.name);

@@ -84,8 +84,9 @@ class Areas {
 
   /// Of these areas, all that a terminal can see.
   [[nodiscard]] SafeOutputs& outputs() noexcept { return *safe_outputs_; }
-  /// The end of the process: the outputs are safe, and nobody else has to put them there. Control thread.
-  void end_outputs() noexcept;
+  /// The end of the process: the outputs are safe. `settled`: no task is within a cycle, so nobody else has
+  /// to put them there again. Control thread.
+  void end_outputs(bool settled) noexcept;
 
   /// plc_area_address, plc_get_area_state. Any context.
   [[nodiscard]] void* address(RTS_HANDLE area) const noexcept;

@@ -100,8 +100,10 @@ void Areas::make_safe_outputs() {
   safe_outputs_->make(std::move(blocks), tasks_.size());
 }
 
-void Areas::end_outputs() noexcept {
+void Areas::end_outputs(bool settled) noexcept {
   safe_outputs_->put_safe(PLC_IMAGE_STATE_ENDED);
+  if (!outputs_page_) return;
+  if (!settled) outputs_page_->leave();
   outputs_page_.reset();
 }
 

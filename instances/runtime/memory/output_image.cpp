@@ -26,9 +26,9 @@ void OutputImage::begin(std::span<const std::byte> initial, std::span<const std:
   } else if (plc_image_read(&image_, scratch_.data(), nullptr) == PLC_IMAGE_OK) {
     shown_ = scratch_;
   }
-  __atomic_store_n(&image_.header->writer, static_cast<plc_image_u64>(::getpid()), __ATOMIC_RELAXED);
+  plc_image_take(&image_, static_cast<plc_image_u64>(::getpid()));
   plc_image_set_safe(&image_, shown_.data());
-  (void)plc_image_tell(&image_, PLC_IMAGE_STATE_STOPPED, 1);
+  plc_image_tell(&image_, PLC_IMAGE_STATE_STOPPED, 1);
   __atomic_store_n(&image_.header->on_end, keeps() ? 0U : 1U, __ATOMIC_RELAXED);
   plc_image_beat(&image_);
   write(initial);
@@ -36,20 +36,22 @@ void OutputImage::begin(std::span<const std::byte> initial, std::span<const std:
 
 void OutputImage::put_safe(unsigned state) noexcept {
   told_.store(0, std::memory_order_relaxed);
-  bool have = !keeps() || shows_safe();
-  for (int attempt = 0; attempt < kAttempts && !have; ++attempt) {
-    const std::uint64_t latest = load();
-    if (plc_image_copy(&image_, latest, shown_.data(), nullptr) == 0) continue;
-    plc_image_set_safe(&image_, shown_.data());
-    have = true;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const std::uint64_t told = plc_image_control(&image_);
+    if (keeps() && (told & PLC_IMAGE_SHOWS_SAFE) == 0) {
+      if (!read_latest(shown_)) continue;
+      plc_image_set_safe(&image_, shown_.data());
+    }
+    // Not if the first cycle has ended meanwhile: then its values are those to be kept.
+    if (plc_image_tell_since(&image_, told, state, 1) != 0) return;
   }
   // An image that cannot be read, because a stranger has spoiled it, cannot be kept either.
-  (void)plc_image_tell(&image_, state, have ? 1 : 0);
+  plc_image_tell(&image_, state, keeps() ? 0 : 1);
 }
 
 void OutputImage::fail() noexcept {
   told_.store(0, std::memory_order_relaxed);
-  (void)plc_image_tell(&image_, PLC_IMAGE_STATE_EXCEPTION, keeps() ? 0 : 1);
+  plc_image_tell(&image_, PLC_IMAGE_STATE_EXCEPTION, keeps() ? 0 : 1);
 }
 
 void OutputImage::reserve(std::span<const ByteRange> ranges) noexcept {

@@ -51,6 +51,10 @@ class OutputImage {
     if (const std::uint64_t told = told_.load(std::memory_order_relaxed); told != 0) resume(told);
   }
 
+  /// What the tasks have published last, whatever is shown. false: nothing, or overtaken each time.
+  [[nodiscard]] bool read_latest(std::span<std::byte> bytes) const noexcept {
+    return plc_image_read_latest(&image_, bytes.data(), nullptr) == PLC_IMAGE_OK;
+  }
   /// Publishes `bytes`. For a sole writer.
   void write(std::span<const std::byte> bytes) noexcept { plc_image_write(&image_, bytes.data()); }
 

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include <unistd.h>
+
 namespace plchost {
 
 void SafeOutputs::make(std::vector<Block> blocks, std::size_t tasks) {
   blocks_ = std::move(blocks);
+  process_ = ::getpid();
   rests_.assign(tasks, true);
   fails_.assign(tasks, false);
 }
@@ -20,11 +23,14 @@ void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
 
 void SafeOutputs::put_safe(unsigned state) noexcept {
   armed_ = false;
+  if (state == PLC_IMAGE_STATE_ENDED) process_ = 0;
   if (state == PLC_IMAGE_STATE_EXCEPTION) failed_.store(true, std::memory_order_relaxed);
   for (Block& block : blocks_) put_safe(block, state);
 }
 
 void SafeOutputs::fail() noexcept {
+  // Not for a process that the application has forked, nor after the end.
+  if (::getpid() != process_) return;
   failed_.store(true, std::memory_order_relaxed);
   for (const Block& block : blocks_) {
     if (block.image != nullptr) {
@@ -58,8 +64,8 @@ void SafeOutputs::task_rests(std::size_t task) noexcept {
   if (!armed_) return;
   for (Block& block : blocks_) {
     const bool writes = std::ranges::find(block.writers, task, &Writer::task) != block.writers.end();
-    if (writes && std::ranges::all_of(block.writers, [&](const Writer& one) { return rests_[one.task]; }))
-      put_safe(block, PLC_IMAGE_STATE_STOPPED);
+    const auto is_over = [&](const Writer& one) { return rests_[one.task] || fails_[one.task]; };
+    if (writes && std::ranges::all_of(block.writers, is_over)) put_safe(block, PLC_IMAGE_STATE_STOPPED);
   }
 }
 

@@ -5,6 +5,8 @@
 #include <functional>
 #include <vector>
 
+#include <sys/types.h>
+
 #include "instances/runtime/memory/output_image.hpp"
 #include "instances/runtime/memory/output_registers.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
@@ -74,6 +76,7 @@ class SafeOutputs {
   std::vector<bool> fails_;  // by task
   bool armed_ = false;       // or driven
   std::atomic<bool> failed_{false};
+  pid_t process_ = 0;
 };
 
 }  // namespace plchost

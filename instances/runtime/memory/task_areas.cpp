@@ -45,7 +45,7 @@ OutputView::OutputView(std::vector<std::byte> initial, Writes writes, OutputRegi
 
 // All but its own bytes, of which it knows more than anybody.
 void OutputView::refresh() noexcept {
-  if (plc_image_read(&image_->image(), scratch_.data(), nullptr) != PLC_IMAGE_OK) return;
+  if (!image_->read_latest(scratch_)) return;
   for (const ByteRange own : writes_.own) {
     std::memcpy(scratch_.data() + own.offset, bytes_.data() + own.offset, own.bytes);
   }

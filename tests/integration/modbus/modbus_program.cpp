@@ -83,7 +83,7 @@ void Plant::show_safe(unsigned state, std::uint16_t word) {
   std::array<std::uint8_t, kSize> bytes{};
   std::memcpy(bytes.data(), &word, sizeof word);
   plc_image_set_safe(&outputs_, bytes.data());
-  (void)plc_image_tell(&outputs_, state, 1);
+  plc_image_tell(&outputs_, state, 1);
 }
 
 ModbusProgram::ModbusProgram(const Plant& plant, const std::string& config, std::string_view log)

@@ -150,7 +150,7 @@ TEST_F(SafeOutputsOfAreas, AreNotLeftByATaskThatComesBackAfterAFault) {
   EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION) << "until a fresh process";
   run(1, 12);
   EXPECT_EQ(shown(), Words{});
-  sut.end_outputs();
+  sut.end_outputs(true);
   EXPECT_EQ(state(), PLC_IMAGE_STATE_ENDED);
   EXPECT_EQ(shown(), Words{});
 }

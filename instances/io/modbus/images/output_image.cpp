@@ -1,14 +1,13 @@
 #include "instances/io/modbus/images/output_image.hpp"
 
-#include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace plchost::modbus {
 
 namespace {
 
 constexpr std::chrono::milliseconds kLookPause{500};
-constexpr Duration kHeartbeat = std::chrono::milliseconds(100);  // of an instance
 
 }  // namespace
 
@@ -31,21 +30,6 @@ void OutputImage::repair() {
   if (!image_.gone()) return;
   auto opened = ProcessImage::open(pool_, name_, static_cast<std::uint32_t>(bytes_.size()), PLC_IMAGE_READ);
   if (opened) image_ = std::move(*opened);  // else the age tells it
-}
-
-// As instances/examples/io_terminal does it. PLC_IMAGE_NEVER is Duration::max().
-Duration OutputImage::silence() const noexcept {
-  const plc_image* const image = &image_.image();
-  switch (plc_image_state(image)) {
-    case PLC_IMAGE_STATE_ENDED:
-      return Duration::zero();
-    case PLC_IMAGE_STATE_STOPPED:
-    case PLC_IMAGE_STATE_EXCEPTION:
-    case PLC_IMAGE_STATE_HALTED:
-      return std::max(Duration(plc_image_heartbeat_age_ns(image)) - kHeartbeat, Duration::zero());
-    default:
-      return Duration(plc_image_age_ns(image));
-  }
 }
 
 }  // namespace plchost::modbus

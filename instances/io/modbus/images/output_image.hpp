@@ -40,7 +40,7 @@ class OutputImage {
         fresh_(bytes_.size()) {}
   void refresh();
   void repair();
-  [[nodiscard]] Duration silence() const noexcept;
+  [[nodiscard]] Duration silence() const noexcept { return Duration(plc_image_silence_ns(&image_.image())); }
 
   std::string pool_;
   std::string name_;
