@@ -148,7 +148,8 @@ struct FaultHandlers {
       errno = saved;
       return;
     }
-    if (armed == nullptr) {
+    // A process that the application has forked in a cycle ends as any other.
+    if (armed == nullptr || own_thread != ::gettid()) {
       FaultBoard::process_ends();
       crash(signal, *info);
       errno = saved;

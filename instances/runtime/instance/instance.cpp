@@ -17,6 +17,7 @@
 #include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/outputs_page.hpp"
+#include "shm/plc_process_image.h"
 
 namespace plchost {
 
@@ -296,6 +297,8 @@ void Instance::report_tick() {
   }
   tick_ = std::move(now);
 }
+
+static_assert(PLC_IMAGE_SIGN_NS == Duration(Instance::kHeartbeat).count());
 
 void Instance::beat() {
   // First: the rest may wait for a lock of the heap, which a task that was caught can hold.

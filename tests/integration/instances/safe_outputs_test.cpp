@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/pages/outputs_page.hpp"
@@ -17,6 +18,9 @@
 
 namespace plchost::testing {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 class SafeOutputsOf : public ::testing::TestWithParam<SafeCase> {
  protected:
@@ -114,6 +118,47 @@ TEST_P(SafeOutputsOf, AnApplicationAreSafeAfterAHitOfAWatchdog) {
   expect_soon_safe(PLC_IMAGE_STATE_EXCEPTION);
 }
 
+TEST_P(SafeOutputsOf, AProcessThatCrashesOutsideOfItsTasksAreSafeWithoutAManager) {
+  start();
+  expect_driven();
+  (void)sut->event("crash").post();
+  EXPECT_EQ(sut->end(), -SIGSEGV);
+  expect_safe(PLC_IMAGE_STATE_EXCEPTION);
+}
+
+TEST_P(SafeOutputsOf, AnApplicationDoNotHearOfAProcessThatItHasForked) {
+  start();
+  expect_driven();
+  (void)sut->event("fork").post();
+  ASSERT_TRUE(eventually([&] { return sut->log().find("forked: ") != std::string::npos; }));
+  EXPECT_THAT(sut->log(), HasSubstr("forked: signal 11"));
+  const auto cycles = sut->task("Fast")->counters.cycles;
+  ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > cycles + 20; }));
+  expect_driven();
+  EXPECT_EQ(sut->task("Fork")->state, PageTaskState::running);
+}
+
+TEST_P(SafeOutputsOf, AKilledProcessAreMadeSafeByTheNextOneAlsoIfItHasNone) {
+  start();
+  expect_driven();
+  sut->end(SIGKILL);
+  sut.emplace(sandbox, std::vector<std::string>{"--application", application("bottling_line")});
+  sut->wait_until_up();
+  expect_safe(PLC_IMAGE_STATE_ENDED);
+}
+
+TEST_P(SafeOutputsOf, AnApplicationAreDrivenUnderEachScheduler) {
+  start();
+  expect_driven();
+  for (const char* scheduler : {"CmpScheduleTimer", "CmpSchedule"}) {
+    ASSERT_EQ(sut->ask(ControlVerb::set_scheduler, scheduler).code, ErrorCode::ok);
+    const auto cycles = sut->task("Slow")->counters.cycles;
+    ASSERT_TRUE(eventually([&] { return sut->task("Slow")->counters.cycles > cycles + 2; }));
+    EXPECT_EQ(plc_image_state(&terminal), PLC_IMAGE_STATE_RUNNING);
+    EXPECT_EQ(shown(), kDriven);
+  }
+}
+
 TEST_P(SafeOutputsOf, ATaskThatFailsAloneAreSafeAndOthersAreDriven) {
   start("[Task.Valve]\nWatchdog.Policy=Task\n");
   expect_driven();
@@ -145,6 +190,28 @@ TEST_P(SafeOutputsOf, AKilledProcessAreToldByTheirAgesAndSafeInTheNextOne) {
   ASSERT_EQ(sut->ask(ControlVerb::start).code, ErrorCode::ok);
   expect_driven();
 }
+
+struct WrongSafeState {
+  const char* setting;
+  const char* text;
+};
+
+class WrongSafeStates : public ::testing::TestWithParam<WrongSafeState> {};
+
+TEST_P(WrongSafeStates, AreRefusedWithPlaceAndWhatIsAllowed) {
+  Sandbox sandbox;
+  const std::string settings = sandbox.write(
+      "line1.cfg", settings_of({.name = "", .setting = GetParam().setting, .shown = {}, .registers = 0}));
+  InstanceProcess sut(sandbox, {"--settings", settings, "--application", application("outputs")});
+  EXPECT_EQ(sut.end(), kExitSetupFailed);
+  EXPECT_THAT(sut.log(), AllOf(HasSubstr("line1.cfg:"), HasSubstr(GetParam().text)));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, WrongSafeStates,
+    ::testing::Values(WrongSafeState{"Off", "Keep, Zero, or 0x and two hexadecimal digits"},
+                      WrongSafeState{"", "Keep, Zero, or 0x and two hexadecimal digits"},
+                      WrongSafeState{"0x11", "SafeState gives 1 bytes, Size is 16"}));
 
 INSTANTIATE_TEST_SUITE_P(AsSet, SafeOutputsOf, ::testing::ValuesIn(kSafeCases),
                          [](const auto& one) { return one.param.name; });

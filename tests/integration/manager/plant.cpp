@@ -13,6 +13,7 @@
 #include "api/control/control_handler.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/pages/log_ring.hpp"
+#include "shm/pages/outputs_page.hpp"
 #include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/support/own_name.hpp"
@@ -42,6 +43,7 @@ Plant::~Plant() {
     TransitionRing::remove(pool_, name);
     MemoryFile::remove(pool_ + ".variables." + name);
     LogRing::remove(pool_, name);
+    OutputsPage::remove(pool_, name);
     MemoryFile::remove(pool_ + ".wish." + name);
   }
   MemoryFile::remove(host_page_name(pool_));

@@ -1,6 +1,7 @@
 // The safe state of outputs: its setting, what is shown when, and that tasks keep their values.
 #include <array>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
@@ -8,8 +9,13 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "instances/runtime/memory/area_plan.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/pages/outputs_page.hpp"
 #include "shm/plc_process_image.h"
 #include "tests/support/whole_cycle.hpp"
 #include "tests/unit/instances/areas_under_test.hpp"
@@ -120,6 +126,90 @@ TEST_F(SafeOutputsOfAreas, AreShownUntilTheFirstCycleAndOfATaskUntilItsOwn) {
   EXPECT_EQ(shown(), (Words{0, 31, 12}));
   run(0, 40);
   EXPECT_EQ(shown(), (Words{40, 31, 42}));
+}
+
+// A task that sets a byte of several tasks to its safe value has changed it.
+TEST_F(SafeOutputsOfAreas, DoNotHideAChangeToTheSafeValue) {
+  task("One", [this] { words(one)[2] = value; });
+  task("Two", [this] { words(two)[2] += value; });
+  const Words initials{5, 5, 5};
+  declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}}, nullptr, initials.data());
+  ASSERT_TRUE(place_only(area_with("Zero")));
+  ASSERT_TRUE(sut.keep());
+  ASSERT_EQ(plc_image_open(pool_.c_str(), "io", 12, PLC_IMAGE_READ, &terminal.emplace()), 0);
+  sut.outputs().arm();
+  run(0, 0);
+  EXPECT_EQ(shown()[2], 0U);
+  run(1, 3);
+  EXPECT_EQ(shown()[2], 3U);
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(shown()[2], 0U);
+  sut.outputs().arm();
+  run(1, 4);
+  EXPECT_EQ(shown()[2], 7U) << "it goes on from its own value";
+}
+
+TEST_F(SafeOutputsOfAreas, OfAProcessThatWasForkedAreNotToldOf) {
+  set_up("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    sut.outputs().fail();
+    ::_exit(0);
+  }
+  ::waitpid(child, nullptr, 0);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+  EXPECT_EQ(shown(), (Words{10, 0, 12}));
+}
+
+TEST_F(SafeOutputsOfAreas, AreLeftToTheManagerWhileATaskIsWithinACycle) {
+  set_up("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  sut.end_outputs(false);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_ENDED);
+  EXPECT_TRUE(std::filesystem::exists(MemoryFile::path(outputs_page_name(pool_, "line1"))));
+  sut.outputs().fail();
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_ENDED) << "nothing is told after the end";
+}
+
+TEST_F(SafeOutputsOfAreas, TellTheSilenceByTheState) {
+  set_up("Zero");
+  const auto beat_before = [this](plc_image_i64 ago) {
+    terminal->header->heartbeat_ns = plc_image_now_ns() - ago;
+  };
+  constexpr plc_image_i64 kLong = 1'000'000'000'000;
+  beat_before(PLC_IMAGE_PATIENCE_NS / 2);
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), 0) << "stopped";
+  beat_before(PLC_IMAGE_PATIENCE_NS + kLong);
+  EXPECT_GE(plc_image_silence_ns(&*terminal), kLong);
+  terminal->header->heartbeat_ns = 0;
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER);
+  sut.outputs().arm();
+  run(0, 1);
+  EXPECT_LT(plc_image_silence_ns(&*terminal), kLong) << "it runs: the image counts";
+  terminal->header->latest = 0;
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER);
+  sut.end_outputs(true);
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), 0) << "ended";
+}
+
+// Firmware that writes inputs tells nothing of itself, and shows what it writes.
+TEST_F(SafeOutputsOfAreas, AreNoneOfTheNextWriterThatTellsNoState) {
+  set_up("Zero");
+  sut.end_outputs(true);
+  const std::string copy = MemoryFile::path(pool_memory_name(pool_, "copy"));
+  std::filesystem::copy_file(MemoryFile::path(pool_memory_name(pool_, "io")), copy);
+  plc_image writer{};
+  ASSERT_EQ(plc_image_open(pool_.c_str(), "copy", 12, PLC_IMAGE_WRITE, &writer), 0);
+  const Words written{7, 8, 9};
+  plc_image_write(&writer, written.data());
+  Words read{};
+  EXPECT_EQ(plc_image_read(&writer, read.data(), nullptr), PLC_IMAGE_OK);
+  EXPECT_EQ(read, written);
+  EXPECT_EQ(plc_image_state(&writer), PLC_IMAGE_STATE_UNTOLD);
+  plc_image_close(&writer);
 }
 
 TEST_F(SafeOutputsOfAreas, OfGivenValuesAreShownWhileADebuggerHaltsTheTasks) {

@@ -1,6 +1,10 @@
-// Three tasks that each write four bytes of one output area, and one that writes registers; with a fault on
+// Three tasks that each write four bytes of one output area, and one that writes registers; with faults on
 // demand. The last four bytes of the area are no task's own.
 #include <cstdint>
+#include <thread>
+
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "../../../../instances/plc_app.hpp"
 
@@ -35,6 +39,14 @@ void setup(plc::Application& app) {
   });
   app.external("Loop", 13, "loop", [] {
     for (;;) sink = sink + 1;
+  });
+  app.external("Crash", 14, "crash", [] { std::thread([] { *nowhere = 1; }).detach(); });
+  app.external("Fork", 14, "fork", [] {
+    const pid_t child = ::fork();
+    if (child == 0) *nowhere = 1;
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    plc::log("forked: signal %d", WTERMSIG(status));
   });
   outputs =
       app.area<Outputs>("outputs", PLC_AREA_OUTPUT, {}, {{{"Fast", 0, 4}, {"Slow", 4, 4}, {"Valve", 8, 4}}});
