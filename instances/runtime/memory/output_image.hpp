@@ -51,7 +51,8 @@ class OutputImage {
     if (const std::uint64_t told = told_.load(std::memory_order_relaxed); told != 0) resume(told);
   }
 
-  /// What the tasks have published last, whatever is shown. false: nothing, or overtaken each time.
+  /// The image that tasks have published last, also while another is shown. false: none, or overtaken each
+  /// time.
   [[nodiscard]] bool read_latest(std::span<std::byte> bytes) const noexcept {
     return plc_image_read_latest(&image_, bytes.data(), nullptr) == PLC_IMAGE_OK;
   }

@@ -207,11 +207,11 @@ TEST_P(WrongSafeStates, AreRefusedWithPlaceAndWhatIsAllowed) {
   EXPECT_THAT(sut.log(), AllOf(HasSubstr("line1.cfg:"), HasSubstr(GetParam().text)));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, WrongSafeStates,
-    ::testing::Values(WrongSafeState{"Off", "Keep, Zero, or 0x and two hexadecimal digits"},
-                      WrongSafeState{"", "Keep, Zero, or 0x and two hexadecimal digits"},
-                      WrongSafeState{"0x11", "SafeState gives 1 bytes, Size is 16"}));
+INSTANTIATE_TEST_SUITE_P(All, WrongSafeStates,
+                         ::testing::Values(WrongSafeState{"Off",
+                                                          "Keep, Zero, or 0x and two hexadecimal digits"},
+                                           WrongSafeState{"", "Keep, Zero, or 0x and two hexadecimal digits"},
+                                           WrongSafeState{"0x11", "SafeState gives 1 bytes, Size is 16"}));
 
 INSTANTIATE_TEST_SUITE_P(AsSet, SafeOutputsOf, ::testing::ValuesIn(kSafeCases),
                          [](const auto& one) { return one.param.name; });

@@ -166,7 +166,7 @@ TEST_P(SafeOutputsUnderAManager, OfAProcessThatStandsStillAreToldByTheirAge) {
   expect_ended();
 }
 
-// What it names would be opened and written with the rights of the manager.
+// Devices that it names would be written with the rights of the manager.
 TEST_P(SafeOutputsUnderAManager, AStrangersPageIsNotFollowed) {
   if (::geteuid() != 0) GTEST_SKIP() << "to give files to another user needs root";
   constexpr uid_t kStranger = 65534;
