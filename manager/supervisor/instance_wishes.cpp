@@ -166,6 +166,7 @@ std::string ManagedInstance::text_of_beginning(EndCause cause) const {
 }
 
 void ManagedInstance::ended_unwatched() {
+  host_.end_outputs();
   start_kind_ = StartKind::after_fault;
   ended({.cause = EndCause::unwatched}, "ended while no manager ran");
 }

@@ -350,11 +350,13 @@ TEST_F(AdoptedWishes, OfAProcessThatWasBeingSetUpAndIsNeverToBeStartedAgain) {
   ASSERT_FALSE(sut().adopt());
   sut().resume();
   EXPECT_EQ(state(), InstanceState::waiting);
+  EXPECT_EQ(host_.ended_outputs, 1) << "of a process that has ended";
   expire_timer();
   EXPECT_EQ(state(), InstanceState::waiting);
   advance(kSetupLimit);
   expire_timer();
   EXPECT_EQ(state(), InstanceState::failed);
+  EXPECT_EQ(host_.ended_outputs, 2) << "of the one that was waited for";
   EXPECT_EQ(host_.spawned.size(), 1U);
 }
 
