@@ -199,7 +199,7 @@ struct WrongSafeState {
 class WrongSafeStates : public ::testing::TestWithParam<WrongSafeState> {};
 
 TEST_P(WrongSafeStates, AreRefusedWithPlaceAndWhatIsAllowed) {
-  Sandbox sandbox;
+  const Sandbox sandbox;
   const std::string settings = sandbox.write(
       "line1.cfg", settings_of({.name = "", .setting = GetParam().setting, .shown = {}, .registers = 0}));
   InstanceProcess sut(sandbox, {"--settings", settings, "--application", application("outputs")});
