@@ -182,10 +182,11 @@ void the_next_writer_comes_first(Scene& scene) {
   scene.thread("successor", [&] {
     plc_image_take(&shared.image, kSuccessor);
     const plc_image_u64 armed = shared.stop();
-    require(plc_image_state(&shared.image) == PLC_IMAGE_STATE_STOPPED, "the state of the writer before");
+    require(plc_image_state(&shared.image) == PLC_IMAGE_STATE_STOPPED,
+            "the end of the writer before in place of the next one");
     shared.write(2);
     plc_image_resume(&shared.image, armed);
-    require(shared.read() == 2, "outputs stay safe although a task drives them");
+    require(shared.read() == 2, "the end of the writer before in place of the next one");
   });
 }
 
