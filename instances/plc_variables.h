@@ -54,6 +54,8 @@ extern "C" {
 #define PLC_TYPE_TIMESPEC_TIME_OF_DAY 23u   /* 16: the same, since midnight */
 #define PLC_TYPE_TIMESPEC_DATE_AND_TIME 24u /* 16: the same, since 1970 */
 #define PLC_TYPE_COUNTED_STRING 25u         /* 1 byte: the length; then dwBytes - 1 of characters */
+#define PLC_TYPE_SIZED_STRING 26u           /* characters, ended by a zero; the last 2 bytes: the length */
+#define PLC_TYPE_DAYS_DATE 27u              /* 8: days since 1970, signed */
 
 #define PLC_MAX_DECLARED_VARIABLES 65536u
 #define PLC_MAX_SYMBOL_NAME 250

@@ -34,6 +34,7 @@
 #include "api/dds/domain.hpp"
 #include "api/dds/object_query.hpp"
 #include "api/dds/topics.hpp"
+#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -139,7 +140,7 @@ class ClientCore {
   [[nodiscard]] Result<void> open_own_reader(dds::TopicReader& answers, const dds::Qos& qos);
   [[nodiscard]] Result<dds::Entity> make_own_topic(const dds::TopicInfo& info);
   [[nodiscard]] Result<void> read_own(dds::TopicReader& answers, dds::Entity topic, const dds::Qos& qos);
-  [[nodiscard]] Result<std::shared_ptr<RequestCaller>> caller(const std::string& host, bool engineering);
+  [[nodiscard]] Result<std::shared_ptr<RequestCaller>> caller(const std::string& host, ApiRole role);
   [[nodiscard]] Result<Asking> begin_asking(const ApiRequest& request);
   /// How long it goes on waiting for the answer.
   struct Wait {
@@ -205,8 +206,8 @@ class ClientCore {
   dds::TopicReader download_acks_;
   Inbox<plc_DownloadAck> downloaded_;
   dds::Entity chunk_topic_;
-  std::array<dds::Entity, 2> request_topics_;
-  std::map<std::pair<std::string, bool>, std::shared_ptr<RequestCaller>> callers_;
+  std::array<dds::Entity, 3> request_topics_;  // by ApiRole
+  std::map<std::pair<std::string, ApiRole>, std::shared_ptr<RequestCaller>> callers_;
   template <class Sample>
   struct Posters {
     dds::Entity topic;

@@ -1,5 +1,6 @@
 // Requests and their answers.
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,9 +15,9 @@ namespace plchost {
 
 namespace {
 
-bool is_engineering(std::int32_t operation) {
+ApiRole role_of(std::int32_t operation) {
   const Operation* const known = find_operation(operation);
-  return known != nullptr && known->role == ApiRole::engineering;
+  return known != nullptr ? known->role : ApiRole::operating;
 }
 
 std::unique_ptr<plc_Request> sample_of(const ApiRequest& request) {
@@ -50,15 +51,15 @@ void ClientCore::take_replies() {
       });
 }
 
-Result<std::shared_ptr<RequestCaller>> ClientCore::caller(const std::string& host, bool engineering) {
-  const std::pair key(host, engineering);
+Result<std::shared_ptr<RequestCaller>> ClientCore::caller(const std::string& host, ApiRole role) {
+  static constexpr std::array kTopics{dds::kViewerRequest, dds::kOperatorRequest, dds::kEngineerRequest};
+  const std::pair key(host, role);
   if (const auto known = callers_.find(key); known != callers_.end()) return known->second;
   const dds::Qos qos = dds::answers_qos(dds::kReply, dds::kReply.qos.depth);
   PLCHOST_TRY(open_own_reader<plc_Reply>(replies_, qos));
-  dds::Entity& topic = request_topics_.at(engineering ? 1 : 0);
+  dds::Entity& topic = request_topics_.at(std::to_underlying(role));
   if (!topic) {
-    PLCHOST_TRY_ASSIGN(
-        topic, dds::make_topic(entity(), engineering ? dds::kEngineerRequest : dds::kOperatorRequest));
+    PLCHOST_TRY_ASSIGN(topic, dds::make_topic(entity(), kTopics.at(std::to_underlying(role))));
   }
   PLCHOST_TRY_ASSIGN(auto made, RequestCaller::create(entity(), topic.get(), host));
   PLCHOST_TRY(pump_->set().add(made.writer(), DDS_PUBLICATION_MATCHED_STATUS));
@@ -72,7 +73,7 @@ Result<std::shared_ptr<RequestCaller>> ClientCore::caller(const std::string& hos
 
 Result<ClientCore::Asking> ClientCore::begin_asking(const ApiRequest& request) {
   Asking asking{.caller = {}, .request = sample_of(request)};
-  PLCHOST_TRY_ASSIGN(asking.caller, caller(request.host, is_engineering(request.operation)));
+  PLCHOST_TRY_ASSIGN(asking.caller, caller(request.host, role_of(request.operation)));
   asking.caller->number(*asking.request);
   return asking;
 }

@@ -24,7 +24,7 @@ from contract import Fault, names_of, parse, partition_of, qos_of  # noqa: E402
 from rows import code_words, status_fields, value_of, words_of  # noqa: E402
 
 HEAD = "// Made from api/control.idl by api/generate/generate.py.\n#pragma once\n\n"
-ROLES = {"op": "Operator", "eng": "Engineer"}
+ROLES = {"all": "Viewer", "op": "Operator", "eng": "Engineer"}
 
 
 def constant_of(kind, name):
@@ -105,15 +105,15 @@ def status_topics(contract):
 def contract_operations(contract):
     lines = [HEAD + "#include <array>\n#include <cstdint>\n#include <string_view>\n", "namespace plchost {\n"]
     lines += ["/// An operation as the contract has it; shm/base/operations.hpp is what the programs go by.", "struct ContractOperation {"]
-    lines += ["  std::string_view name;  ///< \"reset cold\"", "  std::int32_t number;", "  bool engineering;", "  bool names_instance;", "};\n"]
+    lines += ["  std::string_view name;  ///< \"reset cold\"", "  std::int32_t number;", "  std::string_view role;  ///< of its topic: \"eng\"", "  bool names_instance;", "};\n"]
     lines.append("inline constexpr std::array kContractOperations{")
     for constant in contract.constants:
         name = constant.name.removeprefix("OPERATION_").lower().replace("_", " ")
-        told = re.match(r"(op|eng): +(no instance)?", constant.comment)
+        told = re.match(rf"({'|'.join(ROLES)}): +(no instance)?", constant.comment)
         if not told:
-            raise Fault(f"{constant.name}: its comment does not begin with 'op:' or 'eng:'")
-        engineering, names_instance = cpp_bool(told[1] == "eng"), cpp_bool(not told[2])
-        lines.append(f'    ContractOperation{{"{name}", {constant.value}, {engineering}, {names_instance}}},')
+            raise Fault(f"{constant.name}: its comment does not begin with the role of a topic: {', '.join(ROLES)}")
+        names_instance = cpp_bool(not told[2])
+        lines.append(f'    ContractOperation{{"{name}", {constant.value}, "{told[1]}", {names_instance}}},')
     return "\n".join(lines + ["};\n", "}  // namespace plchost\n"])
 
 

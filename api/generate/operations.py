@@ -8,6 +8,7 @@ from contract import Fault
 
 ROW = re.compile(r"^OPERATION\((\w+), (\d+),\s*((?:\"(?:[^\"\\]|\\.)*\"\s*)+)(.*?)\)$", re.DOTALL | re.MULTILINE)
 INTERNAL = ".place = Place::internal"
+ROLES = {"kEngineer": "eng", "kViewer": "all"}  # the others are operators'
 
 
 @dataclasses.dataclass
@@ -31,7 +32,7 @@ def operations_of(path):
     for verb, number, meaning, members in rows:
         if INTERNAL in members:
             continue
-        role = "eng" if ".role = kEngineer" in members else "op"
+        role = next((topic for role, topic in ROLES.items() if f".role = {role}" in members), "op")
         of_host = "no instance: " if ".names_instance = false" in members else ""
         text = "".join(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", meaning))
         found.append(Operation(verb, int(number), f"{role + ':':4} {of_host}{text}"))

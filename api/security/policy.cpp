@@ -55,11 +55,11 @@ std::vector<Grant> may_write(const Subject& subject) {
   const std::string& name = subject.name;
   switch (subject.role) {
     case Role::viewer:
-      return {};
+      return {{{"plc/v1/all/request"}, in(kHostPartition, "*")}};
     case Role::operating:
-      return {{asking({"plc/v1/op/request"}), in(kHostPartition, "*")}};
+      return {{asking({"plc/v1/all/request", "plc/v1/op/request"}), in(kHostPartition, "*")}};
     case Role::engineer:
-      return {{asking({"plc/v1/op/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
+      return {{asking({"plc/v1/all/request", "plc/v1/op/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
     case Role::admin:
       return {{asking({"plc/v1/*/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
     case Role::host:
@@ -73,7 +73,6 @@ std::vector<Grant> may_write(const Subject& subject) {
 
 std::vector<Grant> may_read(const Subject& subject, const GuidPrefix& prefix) {
   const std::string& name = subject.name;
-  if (subject.role == Role::viewer) return {{topics_of(topic_names::kStatus), in(kStatusPartition, "*")}};
   if (subject.role == Role::host) {
     return {{{"plc/v1/status/block_host"}, in(kStatusPartition, "*")},
             {asking({"plc/v1/*/request", "plc/v1/eng/*"}), in(kHostPartition, name)},

@@ -290,9 +290,8 @@ void ControlServer::Parts::on_request(const RequestReader& source, const plc_Req
                    .system_errno = 0,
                    .message = "the request's identity is not that of its writer"});
   }
-  const auto needed =
-      source.role == ApiRole::operating ? security::Role::operating : security::Role::engineer;
-  if (const auto may = guard.check(writer, needed); !may) return refuse(client, request, may.error());
+  if (const auto may = guard.check(writer, role_of(source.role)); !may)
+    return refuse(client, request, may.error());
   do_request(source.role, writer, request);
 }
 
@@ -315,6 +314,8 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
+  const auto may = options.variable_rights.check(operation_of(checked->verb).right, guard, writer);
+  if (!may) return answer(client, identity, may.error().code, may.error().describe());
   if (checked->verb == ControlVerb::read_clock) return tell(client, identity, ErrorCode::ok, "");
   if (checked->verb == ControlVerb::list_objects) return list_objects(client, request);
   if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {

@@ -8,6 +8,7 @@
 #include <control.h>
 
 #include "api/dds/domain.hpp"
+#include "api/server/access/variable_rights.hpp"
 #include "shm/base/result.hpp"
 #include "shm/block_driver/node_directory.hpp"
 
@@ -23,8 +24,9 @@ struct ServerOptions {
   /// How many datagrams were refused so far, for the log; null: nobody counts.
   std::uint64_t (*refused_datagrams)() noexcept = nullptr;
   std::string blocks_base =
-      std::string(kDefaultBlockBase);        ///< of the nodes that are listed, and the gateway
-  std::vector<std::string> labels;           ///< by which clients choose hosts
+      std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
+  std::vector<std::string> labels;     ///< by which clients choose hosts
+  VariableRights variable_rights;
   std::string audit_folder;                  ///< of the log of what clients change; empty: there is none
   std::string applications_folder;           ///< of the applications that were sent; empty: there is none
   std::uint32_t application_limit_mib = 64;  ///< of a file that is sent

@@ -171,7 +171,7 @@ struct ControlServer::Parts {
   dds::TopicReader chunks;
   DownloadTable downloads;
   RunWatch runs;
-  std::array<RequestReader, 2> requests;
+  std::array<RequestReader, 3> requests;
   std::unique_ptr<GatewayThread> gateway;  // of a host that has a number
 };
 

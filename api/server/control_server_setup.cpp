@@ -1,3 +1,4 @@
+#include <array>
 #include <csignal>
 #include <ctime>
 #include <string>
@@ -193,13 +194,15 @@ Result<void> ControlServer::Parts::make_readers() {
                        dds::open_reader(participant.get(), subscriber.get(), info, dds::bounded_qos(info)));
     return {};
   };
-  requests[0].role = ApiRole::operating;
-  requests[1].role = ApiRole::engineering;
   PLCHOST_TRY(open(dds::kDownloadChunk, chunks));
   PLCHOST_TRY(open(dds::kEventPost, event_posts));
   PLCHOST_TRY(open(dds::kEventBatch, event_batches));
-  PLCHOST_TRY(open(dds::kOperatorRequest, requests[0].from));
-  return open(dds::kEngineerRequest, requests[1].from);
+  constexpr std::array kRoles{ApiRole::viewing, ApiRole::operating, ApiRole::engineering};
+  for (std::size_t i = 0; i < kRoles.size(); ++i) {
+    requests[i].role = kRoles[i];
+    PLCHOST_TRY(open(request_topic(kRoles[i]), requests[i].from));
+  }
+  return {};
 }
 
 Result<void> ControlServer::Parts::listen() {

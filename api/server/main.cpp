@@ -50,6 +50,14 @@ int main(int argc, char** argv) {
                  "number of this host for blocks between hosts; 0: none")
       ->check(CLI::Range(std::uint16_t{0}, plchost::kMaxHostNumber));
   app.add_option("--blocks-base", options.blocks_base, "base name of the nodes that send blocks");
+  const auto role = [&app](const char* option, plchost::security::Role& target, const char* help) {
+    app.add_option_function<std::string>(
+           option,
+           [&target](const std::string& word) { target = plchost::security::parse_role(word).value(); }, help)
+        ->check(CLI::IsMember({"viewer", "operator", "engineer"}));
+  };
+  role("--read-variables", options.variable_rights.read, "the role that reads variables of a secured host");
+  role("--write-variables", options.variable_rights.write, "the role that writes and forces them");
   app.add_option("--label", options.labels, "by which clients choose hosts");
   app.add_option("--audit-folder", options.audit_folder, "folder of the log of changes by clients");
   app.add_option("--name-since", options.name_since_ns,

@@ -49,6 +49,7 @@ class StrucppTranslator : public Translator {
     std::ranges::move(plan->remarks, std::back_inserter(context_.report.remarks));
     context_.project = std::move(plan->project);
     files_ = std::move(plan->files);
+    symbols_ = std::move(plan->symbols);
     return context_.good();
   }
 
@@ -67,7 +68,8 @@ class StrucppTranslator : public Translator {
   }
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
-    return strucpp::write_glue(context_.project, context_.project.configurations.front(), resource, files_);
+    return strucpp::write_glue(context_.project, context_.project.configurations.front(), resource, files_,
+                               symbols_);
   }
 
   bool compile(const std::string& name, const std::string& glue, const fs::path& made) override {
@@ -145,6 +147,7 @@ class StrucppTranslator : public Translator {
   BuildContext& context_;
   strucpp::Compiler compiler_;
   std::vector<std::string> files_;
+  std::vector<strucpp::PlannedSymbol> symbols_;
   std::vector<std::string> words_;
   std::vector<std::string> flags_;
 };

@@ -18,6 +18,10 @@ using enum TakesEffect;
 constexpr std::array kPriorityBands = {std::string_view("high"), std::string_view("normal"),
                                        std::string_view("low")};
 
+constexpr std::array kReaders = {std::string_view("viewer"), std::string_view("operator"),
+                                 std::string_view("engineer")};
+constexpr std::array kWriters = {std::string_view("operator"), std::string_view("engineer")};
+
 template <auto Member, class Kind>
 constexpr auto host(const ConfigKey& key) {
   return KeyAccess<Member>::template row<Kind, ConfigReading>("[host]", key);
@@ -107,6 +111,15 @@ constexpr std::array kHostKeys = {
                                                      .when = at_once,
                                                      .initial = "those not in `cores`, else all",
                                                      .meaning = "where manager and API server run"}),
+    host<&HostConfig::read_variables, WordKey<kReaders>>(
+        {.name = "read_variables",
+         .when = new_server,
+         .meaning = "the least [role](../api/security.md) that reads [variables](../instances/variables.md) "
+                    "of instances. Without `identity` everybody can"}),
+    host<&HostConfig::write_variables, WordKey<kWriters>>(
+        {.name = "write_variables",
+         .when = new_server,
+         .meaning = "the least role that writes, forces and unforces variables"}),
     host<&HostConfig::log_level, WordKey<kLogLevels>>(
         {.name = "log_level",
          .when = new_server,

@@ -288,8 +288,10 @@ void ManagedInstance::finish(ErrorCode code, const std::string& text) {
     spdlog::warn("instance {}: {} failed: {}", config_.name, to_string(done.request.verb), text);
   }
   remember();
-  if (code == ErrorCode::ok) return tell_when_kept(done, text);
-  done.reply(ControlReply{.number = done.request.number, .code = code, .text = text});
+  const std::string ended = ended_forces_text(std::exchange(ended_forces_, 0));
+  if (code == ErrorCode::ok) return tell_when_kept(done, text, ended);
+  done.reply(ControlReply{
+      .number = done.request.number, .code = code, .text = ended.empty() ? text : text + "; " + ended});
 }
 
 }  // namespace plchost

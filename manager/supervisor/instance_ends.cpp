@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/operations.hpp"
 #include "shm/base/transient.hpp"
 #include "shm/process/dynamic_loader.hpp"
 
@@ -21,6 +22,7 @@ std::string unasked(const ExitStatus& status) {
 }  // namespace
 
 void ManagedInstance::on_exit(const ExitStatus& status) {
+  const std::string ended_forces = ended_forces_text(forces_of_process());
   status_.pid = 0;
   status_.core = -1;
   const bool guessed = unheard_ && !unreadable_.empty();
@@ -40,7 +42,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   ended({.cause = nobodys_word ? EndCause::unwatched : cause_of(status),
          .lasted = phase_ == Phase::up ? surroundings_.now() - up_since_ : Duration::zero(),
          .has_earlier = phase_ == Phase::adopting && before_.has_value() && !removed_},
-        unasked(status));
+        ended_forces.empty() ? unasked(status) : unasked(status) + "; " + ended_forces);
 }
 
 void ManagedInstance::set_up_ended(const ExitStatus& status, SetupStep reached) {

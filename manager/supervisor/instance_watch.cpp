@@ -41,6 +41,13 @@ void ManagedInstance::forget_signs() {
   sign_at_ = surroundings_.now();
 }
 
+// Its page is written with each force, and outlasts a crash.
+std::uint32_t ManagedInstance::forces_of_process() {
+  const auto page = host_.runtime();
+  const auto& newest = page && page->pid == status_.pid ? page : said_;
+  return newest ? newest->forces : 0;
+}
+
 // The process's present report of itself; nothing: it has none.
 std::optional<InstanceRuntime> ManagedInstance::watch_process() {
   auto page = host_.runtime();

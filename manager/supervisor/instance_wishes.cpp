@@ -233,15 +233,16 @@ void ManagedInstance::remember() {
   own_.wishes.keep(now);
 }
 
-void ManagedInstance::tell_when_kept(const Operation& done, const std::string& text) {
+void ManagedInstance::tell_when_kept(const Operation& done, std::string text, const std::string& more) {
   const bool events =
       done.request.verb == ControlVerb::register_event || done.request.verb == ControlVerb::unregister_event;
   if (events) own_.wishes.keep_events();
   // A client that gets no text says by itself what is done.
-  const std::string said =
-      text.empty() ? fmt::format("{}: {}", config_.name,
-                                 done_text(operation_of(done.request.verb), done.request.argument))
-                   : text;
+  std::string said = text.empty()
+                         ? fmt::format("{}: {}", config_.name,
+                                       done_text(operation_of(done.request.verb), done.request.argument))
+                         : text;
+  if (!more.empty()) said = text = said + "; " + more;
   own_.wishes.when_kept(
       [reply = done.reply, number = done.request.number, text, said](const std::string& problem) {
         const std::string all = fmt::format("{}; a power cut would undo it: {}", said, problem);

@@ -249,6 +249,7 @@ void ManagedInstance::spawn(Next next) {
 }
 
 void ManagedInstance::end_process(Next next) {
+  if (operation_) ended_forces_ = forces_of_process();
   next_ = next;
   ending_ = Ending::asked;
   if (!silent_ && send(ControlVerb::shutdown)) {

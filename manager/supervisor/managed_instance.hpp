@@ -243,7 +243,8 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] std::int64_t unix_of(TimePoint time) const noexcept {
     return time.time_since_epoch().count() + unix_offset_ns_;
   }
-  void tell_when_kept(const Operation& done, const std::string& text);
+  /// `more`: is told behind it; may be empty.
+  void tell_when_kept(const Operation& done, std::string text, const std::string& more);
 
   // A process that does not answer, or whose page is damaged: instance_watch.cpp
   [[nodiscard]] std::optional<InstanceRuntime> watch_process();
@@ -258,6 +259,8 @@ class ManagedInstance : public InstanceEvents {
   void answers_again();
   void tell_problems();
   void forget_signs();
+  /// How many values of its variables are forced, as its process has said last.
+  [[nodiscard]] std::uint32_t forces_of_process();
 
   // A process that an earlier manager has made: instance_adoption.cpp
   /// `problem`: why it has not answered; empty: it has.
@@ -341,6 +344,7 @@ class ManagedInstance : public InstanceEvents {
   TimePoint asked_at_;                   // for its status, last
   std::uint64_t asked_number_ = 0;       // of the answer that is awaited; 0: none is
   int answers_ = 0;                      // to that, since the page has beaten last
+  std::uint32_t ended_forces_ = 0;       // by the end of a process that a command has asked for
   std::optional<InstanceRuntime> said_;  // by itself last: in its page, or when it was asked
   TimePoint up_since_{};
   TimePoint settled_{};        // when the state was last known from the process's own answer

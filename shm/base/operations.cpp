@@ -10,6 +10,8 @@ namespace {
 
 using Place = OperationPlace;
 using Argument = OperationArgument;
+using Right = OperationRight;
+constexpr ApiRole kViewer = ApiRole::viewing;
 constexpr ApiRole kEngineer = ApiRole::engineering;
 
 /// "reset_cold" as "reset cold".
@@ -57,6 +59,11 @@ const Operation* find_operation(std::string_view name) noexcept {
 
 std::string_view to_string(ControlVerb verb) noexcept {
   return operation_of(verb).name;
+}
+
+std::string ended_forces_text(std::size_t count) {
+  if (count == 0) return "";
+  return count == 1 ? "1 force ended" : fmt::format("{} forces ended", count);
 }
 
 std::string done_text(const Operation& operation, std::string_view argument) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -25,8 +26,11 @@ enum class OperationPlace : std::uint8_t {
   internal,  ///< the same, and only the manager asks for it
 };
 
-/// The role of a client is decided by the topic that it could write to.
-enum class ApiRole : std::uint8_t { operating, engineering };
+/// The role of a client is decided by the topic that it could write to. That of `viewing` is for all clients.
+enum class ApiRole : std::uint8_t { viewing, operating, engineering };
+
+/// A right that a key of [host] gives to a role. The topic's role alone does not suffice then.
+enum class OperationRight : std::uint8_t { none, read_variables, write_variables };
 
 enum class OperationArgument : std::uint8_t {
   none,
@@ -49,6 +53,7 @@ struct Operation {
   std::string_view name;  ///< the verb's words: for people, in the audit log, and on control sockets
   OperationPlace place = OperationPlace::manager;
   ApiRole role = ApiRole::operating;
+  OperationRight right = OperationRight::none;
   OperationArgument argument = OperationArgument::none;
   OperationOptions options = OperationOptions::none;
   bool names_instance = true;
@@ -70,6 +75,9 @@ struct Operation {
 [[nodiscard]] const Operation* find_operation(std::int32_t number) noexcept;
 [[nodiscard]] const Operation* find_operation(std::string_view name) noexcept;
 [[nodiscard]] std::string_view to_string(ControlVerb verb) noexcept;
+
+/// Said of forces of variables that ended with a process or a version: "2 forces ended"; empty: none.
+[[nodiscard]] std::string ended_forces_text(std::size_t count);
 
 /// Said when it was done with that argument.
 [[nodiscard]] std::string done_text(const Operation& operation, std::string_view argument);

@@ -118,7 +118,8 @@ std::string type_text(const VariableSymbol& symbol) {
   }
   if (!text.empty()) text += "] OF ";
   text += traits_of(symbol.type).name;
-  if (is_string(symbol.type)) fmt::format_to(std::back_inserter(text), "[{}]", symbol.bytes - 1);
+  if (is_string(symbol.type))
+    fmt::format_to(std::back_inserter(text), "[{}]", string_room(symbol.type, symbol.bytes));
   return text;
 }
 

@@ -22,7 +22,7 @@ namespace {
 using enum VariableType;
 
 // In the order of their numbers, from 1.
-constexpr std::array<VariableTypeTraits, 25> kTypes{{{bool_, "BOOL", 1},
+constexpr std::array<VariableTypeTraits, 27> kTypes{{{bool_, "BOOL", 1},
                                                      {sint, "SINT", 1},
                                                      {int_, "INT", 2},
                                                      {dint, "DINT", 4},
@@ -46,8 +46,14 @@ constexpr std::array<VariableTypeTraits, 25> kTypes{{{bool_, "BOOL", 1},
                                                      {timespec_date, "DATE", 16},
                                                      {timespec_time_of_day, "TOD", 16},
                                                      {timespec_date_and_time, "DT", 16},
-                                                     {counted_string, "STRING", 0}}};
+                                                     {counted_string, "STRING", 0},
+                                                     {sized_string, "STRING", 0},
+                                                     {days_date, "DATE", 8}}};
 constexpr std::int64_t kPerSecond = 1'000'000'000;
+constexpr std::int64_t kPerDay = 86'400 * kPerSecond;
+/// Behind the characters of a sized_string: its length. Before it may be a byte that is no character.
+using StringLength = std::uint16_t;
+constexpr std::size_t kMinSized = 2 + sizeof(StringLength);
 constexpr std::size_t kMaxCounted = 255;
 
 std::unexpected<Error> not_allowed(std::string_view text, std::string_view allowed) {
@@ -111,6 +117,12 @@ std::string real_text(Value value) {
   return text;
 }
 
+std::string days_text(std::int64_t days) {
+  std::int64_t nanoseconds = 0;
+  return __builtin_mul_overflow(days, kPerDay, &nanoseconds) ? fmt::format("{}", days)
+                                                             : time_text(TimeForm::date, nanoseconds);
+}
+
 std::string timespec_text(TimeForm form, std::int64_t seconds, std::int64_t nanoseconds) {
   std::int64_t sum = 0;
   if (__builtin_mul_overflow(seconds, kPerSecond, &sum) || __builtin_add_overflow(sum, nanoseconds, &sum))
@@ -124,6 +136,11 @@ std::string_view characters_of(VariableType type, std::span<const std::byte> val
   if (value.empty()) return {};
   if (type == counted_string)
     return {bytes + 1, std::min<std::size_t>(std::to_integer<std::size_t>(value[0]), value.size() - 1)};
+  if (type == sized_string) {
+    if (value.size() < kMinSized) return {};
+    const std::size_t room = value.size() - sizeof(StringLength);
+    return {bytes, std::min<std::size_t>(load<StringLength>(value.subspan(room)), room - 1)};
+  }
   return {bytes, static_cast<std::size_t>(std::find(bytes, bytes + value.size(), '\0') - bytes)};
 }
 
@@ -155,6 +172,7 @@ std::string whole_text(VariableType type, std::span<const std::byte> value) {
   if (type == bool_) return value[0] == std::byte{0} ? "FALSE" : "TRUE";
   if (type == real) return real_text(load<float>(value));
   if (type == lreal) return real_text(load<double>(value));
+  if (type == days_date) return days_text(load<std::int64_t>(value));
   if (const auto form = form_of(type)) {
     if (type < timespec_time) return time_text(*form, load<std::int64_t>(value));
     return timespec_text(*form, load<std::int64_t>(value), load<std::int64_t>(value.subspan(8)));
@@ -269,7 +287,9 @@ Result<void> parse_bool(std::string_view text, std::span<std::byte> value) {
 Result<void> parse_moment(VariableType type, TimeForm form, std::string_view text,
                           std::span<std::byte> value) {
   PLCHOST_TRY_ASSIGN(const std::int64_t nanoseconds, parse_time(form, text));
-  if (type < timespec_time) {
+  if (type == days_date) {
+    store(value, nanoseconds / kPerDay);  // a date is a whole number of them
+  } else if (type < timespec_time) {
     store(value, nanoseconds);
   } else {
     const auto [seconds, rest] = std::lldiv(nanoseconds, kPerSecond);
@@ -322,8 +342,7 @@ Result<void> parse_string(VariableType type, std::string_view text, std::span<st
     PLCHOST_TRY_ASSIGN(characters, unquoted(text));
   }
   const bool counted = type == counted_string;
-  const std::size_t most =
-      std::min(value.empty() ? 0 : value.size() - 1, counted ? kMaxCounted : value.size());
+  const std::size_t most = string_room(type, value.size());
   if (characters.size() > most)
     return not_allowed(text,
                        fmt::format("a text of at most {} bytes; this one has {}", most, characters.size()));
@@ -333,6 +352,8 @@ Result<void> parse_string(VariableType type, std::string_view text, std::span<st
   std::ranges::fill(value, std::byte{0});
   if (counted) value[0] = static_cast<std::byte>(characters.size());
   std::memcpy(value.data() + (counted ? 1 : 0), characters.data(), characters.size());
+  if (type == sized_string && value.size() >= kMinSized)
+    store(value.last(sizeof(StringLength)), static_cast<StringLength>(characters.size()));
   return {};
 }
 
@@ -351,7 +372,14 @@ const VariableTypeTraits& traits_of(VariableType type) noexcept {
 }
 
 bool is_string(VariableType type) noexcept {
-  return type == string || type == counted_string;
+  return type == string || type == counted_string || type == sized_string;
+}
+
+std::size_t string_room(VariableType type, std::size_t bytes) noexcept {
+  if (bytes == 0) return 0;
+  if (type == counted_string) return std::min(bytes - 1, kMaxCounted);
+  if (type == sized_string) return bytes < kMinSized ? 0 : bytes - kMinSized;
+  return bytes - 1;
 }
 
 std::string variable_text(VariableType type, std::span<const std::byte> value, std::size_t most) {
@@ -371,6 +399,7 @@ Result<void> parse_variable(VariableType type, std::string_view text, std::span<
   if (type == bool_) return parse_bool(literal, value);
   if (type == real) return parse_real<float>(type, literal, value);
   if (type == lreal) return parse_real<double>(type, literal, value);
+  if (type == days_date) return parse_moment(type, TimeForm::date, literal, value);
   if (const auto form = form_of(type)) return parse_moment(type, *form, literal, value);
   return parse_integer(type, literal, value);
 }

@@ -39,6 +39,8 @@ enum class VariableType : std::uint8_t {
   timespec_time_of_day,
   timespec_date_and_time,
   counted_string,
+  sized_string,
+  days_date,
 };
 
 /// A row of the table of types.
@@ -52,6 +54,8 @@ struct VariableTypeTraits {
 [[nodiscard]] const VariableTypeTraits* find_variable_type(std::uint32_t number) noexcept;
 [[nodiscard]] const VariableTypeTraits& traits_of(VariableType type) noexcept;
 [[nodiscard]] bool is_string(VariableType type) noexcept;
+/// The most characters that a string with so many bytes of memory takes.
+[[nodiscard]] std::size_t string_room(VariableType type, std::size_t bytes) noexcept;
 
 /// A value as text, as Structured Text writes it. BOOL: TRUE. Integers: -12. BYTE to LWORD: 16#00FF.
 /// REAL: 1.5. Times: T#1s500ms, D#2026-11-25, TOD#12:30:00, DT#2026-11-25-12:30:00. STRING: 'text' with $

@@ -38,6 +38,7 @@ struct Part {
 [[nodiscard]] Result<std::vector<Row>> measure_pool(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_pool_deaths(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_blocks(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_variables(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_start(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_fleet(const Plan& plan);
 

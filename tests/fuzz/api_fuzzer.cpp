@@ -114,7 +114,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   auto request = sample_from<plc_Request>(data, size);
   make_possible(request, data, size);
   take_chunks(data, size);
-  for (const ApiRole role : {ApiRole::operating, ApiRole::engineering}) {
+  for (const ApiRole role : {ApiRole::viewing, ApiRole::operating, ApiRole::engineering}) {
     const auto checked = check_request(request, role, "hosta", kInstances);
     if (checked ? !decode_request(encode(*checked)) || !names_what_is_there(*checked)
                 : checked.error().message.empty()) {

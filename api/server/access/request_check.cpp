@@ -9,6 +9,7 @@
 
 #include "api/control/application_order.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/operations.hpp"
 
@@ -117,8 +118,8 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
   }
   if (operation->role != role) {
     return failure(ErrorCode::refused,
-                   fmt::format("'{}' is not for the {} role: write it to the other request topic",
-                               operation->name, role == ApiRole::operating ? "operator" : "engineer"));
+                   fmt::format("'{}' does not belong to the topic {}: write it to {}", operation->name,
+                               request_topic(role).name, request_topic(operation->role).name));
   }
   const auto instance = dds::text_of(request.instance);
   PLCHOST_TRY(check_instance(*operation, instance, host, instances));
@@ -126,6 +127,16 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
   PLCHOST_TRY(check_argument(*operation, argument));
   PLCHOST_TRY_ASSIGN(auto options, check_options(*operation, request));
   return ControlRequest{0, operation->verb, std::string(instance), std::string(argument), std::move(options)};
+}
+
+const dds::TopicInfo& request_topic(ApiRole role) noexcept {
+  if (role == ApiRole::engineering) return dds::kEngineerRequest;
+  return role == ApiRole::operating ? dds::kOperatorRequest : dds::kViewerRequest;
+}
+
+security::Role role_of(ApiRole role) noexcept {
+  if (role == ApiRole::engineering) return security::Role::engineer;
+  return role == ApiRole::operating ? security::Role::operating : security::Role::viewer;
 }
 
 bool only_reads(std::int32_t operation) noexcept {

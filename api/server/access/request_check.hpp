@@ -7,6 +7,8 @@
 
 #include <control.h>
 
+#include "api/dds/topic_info.hpp"
+#include "api/security/role.hpp"
 #include "shm/base/operations.hpp"
 #include "shm/sockets/control_message.hpp"
 
@@ -19,6 +21,10 @@ namespace plchost {
 [[nodiscard]] Result<ControlRequest> check_request(const plc_Request& request, ApiRole role,
                                                    std::string_view host,
                                                    std::span<const std::string_view> instances);
+
+/// The topic that the operations of that role are written to, and the role that an identity needs for it.
+[[nodiscard]] const dds::TopicInfo& request_topic(ApiRole role) noexcept;
+[[nodiscard]] security::Role role_of(ApiRole role) noexcept;
 
 /// An operation that changes nothing, by its number.
 [[nodiscard]] bool only_reads(std::int32_t operation) noexcept;

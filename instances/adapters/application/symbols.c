@@ -12,7 +12,8 @@ static RTS_RESULT declaring;
 static void declare(const struct plchost_symbol* symbol) {
   Plc_Variable variable;
   unsigned int i;
-  const int is_string = symbol->type == PLC_TYPE_STRING || symbol->type == PLC_TYPE_COUNTED_STRING;
+  const int is_string = symbol->type == PLC_TYPE_STRING || symbol->type == PLC_TYPE_COUNTED_STRING ||
+                        symbol->type == PLC_TYPE_SIZED_STRING;
   RTS_RESULT result;
   memset(&variable, 0, sizeof variable);
   variable.dwSize = sizeof variable;

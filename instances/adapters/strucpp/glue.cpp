@@ -1,8 +1,13 @@
 #include "instances/adapters/strucpp/glue.hpp"
 
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/strucpp/symbols.hpp"
 
 namespace plchost::strucpp {
 
@@ -13,8 +18,10 @@ using iec::folded;
 class Writer : public iec::GlueWriter {
  public:
   Writer(const iec::Project& project, const iec::Configuration& configuration, const iec::Resource& resource,
-         std::span<const std::string> files)
-      : GlueWriter(project, configuration, resource, iec::Compiler::strucpp), files_(files) {}
+         std::span<const std::string> files, std::span<const PlannedSymbol> symbols)
+      : GlueWriter(project, configuration, resource, iec::Compiler::strucpp),
+        files_(files),
+        symbols_(symbols) {}
 
  private:
   void write_head() override {
@@ -67,17 +74,43 @@ class Writer : public iec::GlueWriter {
     if (found == plan().globals.end()) return "0";  // there is a problem already
     return fmt::format("*strucpp::{}.raw_ptr() ? 1 : 0", found->second->member);
   }
+  void write_symbols() override {
+    const Symbols found = symbols_of(project(), plan(), symbols_);
+    std::ranges::copy(found.remarks, std::back_inserter(plan().remarks));
+    print("void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n  (void)use;\n");
+    for (const Symbol& symbol : found.all) write_symbol(symbol);
+    print("}}\n");
+  }
+  void write_symbol(const Symbol& symbol) {
+    const auto text = [](const std::string& name) {
+      return name.empty() ? "nullptr" : fmt::format("\"{}\"", name);
+    };
+    std::string indexes;
+    std::string dimensions;
+    for (std::size_t i = 0; i < symbol.bounds.size(); ++i) {
+      const auto [first, last] = symbol.bounds[i];
+      indexes += fmt::format(", long i{}", i);
+      dimensions += fmt::format("{{{}, {}u}}, ", first, std::int64_t{last} - first + 1);
+    }
+    print(
+        "  plchost_show<{0}>(use, {1}, [](auto& c{2}) -> decltype(({3})) {{ return {3}; }},\n"
+        "                  {{\"{4}\", {5}u, {6}u, {7}u, {8}, {9}, {{{10}}}}});\n",
+        symbol.bounds.size(), symbol.root, indexes, symbol.value, symbol.name, symbol.type, symbol.bytes,
+        symbol.read_only ? 1 : 0, text(symbol.task), text(symbol.area), dimensions);
+  }
   // The constructors have done it.
   void write_binding() override { print("void plchost_bind(void) {{}}\n"); }
 
   std::span<const std::string> files_;
+  std::span<const PlannedSymbol> symbols_;
 };
 
 }  // namespace
 
 iec::Glue write_glue(const iec::Project& project, const iec::Configuration& configuration,
-                     const iec::Resource& resource, std::span<const std::string> files) {
-  return Writer(project, configuration, resource, files).write();
+                     const iec::Resource& resource, std::span<const std::string> files,
+                     std::span<const PlannedSymbol> symbols) {
+  return Writer(project, configuration, resource, files, symbols).write();
 }
 
 }  // namespace plchost::strucpp

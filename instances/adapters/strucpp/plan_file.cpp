@@ -27,7 +27,8 @@ constexpr std::size_t kMostEntries = 100'000;  // of one list
 constexpr std::size_t kMostText = 1'000'000;
 constexpr std::size_t kMostName = 500;
 constexpr int kMostPriority = 31;
-constexpr int kMostDepth = 20;  // of lists and objects within each other; translate.mjs writes 9
+constexpr int kMostIndex = 1'000'000'000;  // of an array, also below 0
+constexpr int kMostDepth = 20;             // of lists and objects within each other; translate.mjs writes 9
 
 constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
 
@@ -120,7 +121,7 @@ class Reader {
 
   ReadPlan read(const json& root) {
     const Value plan(root, "");
-    plan.with({"format", "problems", "remarks", "files", "pous", "types", "configurations"});
+    plan.with({"format", "problems", "remarks", "files", "pous", "types", "symbols", "configurations"});
     (void)plan["format"].number(1, 1);
     plan["problems"].each([&](const Value& one) { read_.problems.push_back(problem(one)); });
     plan["remarks"].each([&](const Value& one) { read_.remarks.push_back(problem(one)); });
@@ -132,6 +133,7 @@ class Reader {
                                      .definition = iec::folded(one["definition"].text()),
                                      .place = place(one["place"])});
     });
+    plan["symbols"].each([&](const Value& one) { read_.symbols.push_back(symbol(one)); });
     plan["configurations"].each(
         [&](const Value& one) { read_.project.configurations.push_back(configuration(one)); });
     return std::move(read_);
@@ -160,6 +162,43 @@ class Reader {
     if (!name.ends_with(".cpp") || name.starts_with("."))
       value.refuse("a name of a file *.cpp in this folder");
     return name;
+  }
+
+  static PlannedSymbol symbol(const Value& value) {
+    value.with({"name", "type", "value", "bounds"});
+    PlannedSymbol symbol{.name = path(value["name"]),
+                         .type = value["type"].name(),
+                         .value = path(value["value"]),
+                         .bounds = {}};
+    value["bounds"].each([&](const Value& one) {
+      std::vector<int> numbers;
+      one.each([&](const Value& number) {
+        numbers.push_back(static_cast<int>(number.number(-kMostIndex, kMostIndex)));
+      });
+      if (numbers.size() != 2 || numbers[0] > numbers[1]) one.refuse("two numbers, the first the smaller");
+      symbol.bounds.push_back({.first = numbers[0], .last = numbers[1]});
+    });
+    for (const std::string& text : {symbol.name, symbol.value}) {
+      if (static_cast<std::size_t>(std::ranges::count(text, '[')) != symbol.bounds.size())
+        value["bounds"].refuse("two numbers for each []");
+    }
+    return symbol;
+  }
+  /// Names with dots between them, and "[]" behind them.
+  static std::string path(const Value& value) {
+    constexpr std::string_view kAllowed = "names with dots between them and [] behind them";
+    std::string text = value.text_of(std::string(kLetters) + ".[]", kAllowed);
+    char before = '.';
+    for (const char c : text) {
+      const bool follows = c == '.'   ? before != '.' && before != '['
+                           : c == '[' ? before != '.' && before != '['
+                           : c == ']' ? before == '['
+                                      : before != ']' && before != '[';
+      if (!follows) value.refuse(kAllowed);
+      before = c;
+    }
+    if (before == '.' || before == '[') value.refuse(kAllowed);
+    return text;
   }
 
   iec::Pou pou(const Value& value) const {

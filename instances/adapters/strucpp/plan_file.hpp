@@ -11,11 +11,24 @@
 
 namespace plchost::strucpp {
 
+/// A variable of the compiler's table for debuggers; an array is one of them.
+struct PlannedSymbol {
+  struct Bounds {
+    int first = 0;
+    int last = 0;
+  };
+  std::string name;            ///< "ONE.GRID[][].X", "TOTAL"
+  std::string type;            ///< "REAL"
+  std::string value;           ///< in C++: "g_config.ONE.GRID[][].X", "TOTAL.value"
+  std::vector<Bounds> bounds;  ///< for each []
+};
+
 /// A program as translate.mjs has read it.
 struct ReadPlan {
   iec::Project project;
   std::vector<std::string> files;  ///< of C++, that STruC++ has written
-  iec::SourceProblems problems;    ///< errors of the compiler, and those of tasks
+  std::vector<PlannedSymbol> symbols;
+  iec::SourceProblems problems;  ///< errors of the compiler, and those of tasks
   iec::SourceProblems remarks;
 };
 

@@ -2,10 +2,14 @@
 #ifndef PLCHOST_STRUCPP_HPP
 #define PLCHOST_STRUCPP_HPP
 
+#include <cstddef>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <exception>
 #include <mutex>
+#include <type_traits>
+#include <utility>
 
 #include <pthread.h>
 
@@ -63,6 +67,133 @@ inline void plchost_run(Program& program) noexcept {
     plc_log(2, "the program threw something that is no std::exception");
     std::abort();
   }
+}
+
+// The value of a variable as it lies in memory. The library's own forcing is not used: it would hold a value
+// within a cycle, too.
+template <class T>
+T& plchost_value(T& plain) noexcept {
+  return plain;
+}
+template <class T>
+T& plchost_value(strucpp::IECVar<T>& variable) noexcept {
+  return *variable.raw_ptr();
+}
+template <class T>
+const T& plchost_value(const strucpp::IECVar<T>& variable) noexcept {
+  return *variable.raw_ptr();
+}
+// These two have it as their first member.
+template <std::size_t N>
+strucpp::IECString<N>& plchost_value(strucpp::IECStringVar<N>& variable) noexcept {
+  static_assert(std::is_standard_layout_v<strucpp::IECStringVar<N>>);
+  return reinterpret_cast<strucpp::IECString<N>&>(variable);
+}
+template <class E>
+strucpp::IEC_ENUM_Value<E>& plchost_value(strucpp::IEC_ENUM_Var<E>& variable) noexcept {
+  static_assert(std::is_standard_layout_v<strucpp::IEC_ENUM_Var<E>>);
+  return reinterpret_cast<strucpp::IEC_ENUM_Value<E>&>(variable);
+}
+
+// An element of an array, or of an array of arrays.
+template <class A>
+auto plchost_at(A& a, long i) -> decltype((a[i])) {
+  return a[i];
+}
+template <class A>
+auto plchost_at(A& a, long i, long j) -> decltype((a(i, j))) {
+  return a(i, j);
+}
+template <class A>
+auto plchost_at(A& a, long i, long j) -> decltype((a[i][j])) {
+  return a[i][j];
+}
+template <class A>
+auto plchost_at(A& a, long i, long j, long k) -> decltype((a(i, j, k))) {
+  return a(i, j, k);
+}
+template <class A>
+auto plchost_at(A& a, long i, long j, long k) -> decltype((a(i, j)[k])) {
+  return a(i, j)[k];
+}
+template <class A>
+auto plchost_at(A& a, long i, long j, long k) -> decltype(plchost_at(a[i], j, k)) {
+  return plchost_at(a[i], j, k);
+}
+
+// A symbol without its place.
+struct plchost_shown {
+  const char* name;
+  unsigned int type;   // PLC_TYPE_...
+  unsigned int bytes;  // of that type; 0: of a string
+  unsigned int read_only;
+  const char* task;
+  const char* area;
+  struct {
+    int first;
+    unsigned int count;
+  } dimension[3];
+};
+
+// How a value in memory is to be read; 0: it is not as the table for debuggers has it.
+template <class T>
+struct plchost_type {
+  static constexpr unsigned int of(const plchost_shown& shown) {
+    return std::is_arithmetic_v<T> && sizeof(T) == shown.bytes ? shown.type : 0;
+  }
+};
+template <std::size_t N>
+struct plchost_type<strucpp::IECString<N>> {
+  static constexpr unsigned int of(const plchost_shown& shown) { return shown.bytes == 0 ? shown.type : 0; }
+};
+template <class E>
+struct plchost_type<strucpp::IEC_ENUM_Value<E>> {
+  static constexpr unsigned int of(const plchost_shown&) {
+    return sizeof(E) == 1 ? 2 : sizeof(E) == 2 ? 3 : sizeof(E) == 4 ? 4 : 5;  // PLC_TYPE_SINT to _LINT
+  }
+};
+
+template <std::size_t... D, class Root, class Path>
+bool plchost_find(std::index_sequence<D...>, void (*use)(const plchost_symbol*), Root& root, Path path,
+                  const plchost_shown& shown) {
+  if constexpr (std::is_invocable_v<Path, Root&, decltype(static_cast<void>(D), 0L)...>) {
+    long index[] = {shown.dimension[D].first..., 0};
+    auto& first = plchost_value(path(root, index[D]...));
+    using Value = std::remove_reference_t<decltype(first)>;
+    plchost_symbol symbol = {};
+    symbol.name = shown.name;
+    symbol.type = plchost_type<std::remove_const_t<Value>>::of(shown);
+    symbol.value = const_cast<void*>(static_cast<const void*>(&first));
+    symbol.bytes = sizeof first;
+    symbol.read_only = shown.read_only != 0 || std::is_const_v<Value>;
+    symbol.dimensions = sizeof...(D);
+    symbol.task = shown.task;
+    symbol.area = shown.area;
+    for (std::size_t d = 0; d < sizeof...(D); ++d) {
+      symbol.dimension[d].first = shown.dimension[d].first;
+      symbol.dimension[d].count = shown.dimension[d].count;
+      symbol.dimension[d].stride = sizeof first;
+      if (shown.dimension[d].count < 2) continue;
+      ++index[d];
+      const auto* const next = reinterpret_cast<const char*>(&plchost_value(path(root, index[D]...)));
+      symbol.dimension[d].stride = static_cast<unsigned int>(next - static_cast<const char*>(symbol.value));
+      --index[d];
+    }
+    if (symbol.type != 0) use(&symbol);
+    return symbol.type != 0;
+  } else {
+    return false;
+  }
+}
+
+// `path` finds a variable in `root`, by the indexes of its dimensions.
+template <std::size_t Dimensions, class Root, class Path>
+void plchost_show(void (*use)(const plchost_symbol*), Root& root, Path path, const plchost_shown& shown) {
+  if (plchost_find(std::make_index_sequence<Dimensions>(), use, root, path, shown)) return;
+  char text[200];
+  std::snprintf(text, sizeof text, "%s cannot be seen from outside: STruC++ keeps it in another way",
+                shown.name);
+  plc_log(1, text);
 }
 
 #endif

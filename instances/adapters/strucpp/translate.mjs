@@ -7,6 +7,7 @@ import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 const kMostMessages = 100; // more are not told
+const kMostSymbols = 65536; // as plc_variables.h has it
 const kMostElements = 1000; // of an array of function blocks, each with variables of its own
 
 const folder = resolve(process.argv[2]);
@@ -318,6 +319,23 @@ class Plan {
   }
 }
 
+// The variables of the compiler's table for debuggers, each array as one: GRID[][].X and the bounds of its indexes. An
+// entry of the table: { (void*)&g_config.ONE.GRID[-1][0].X, TAG_REAL, 0 },  // ONE.GRID[-1][0].X
+function symbolsOf(table) {
+  const found = new Map();
+  const pattern = (text) => text.replace(/\[-?\d+\]/g, '[]');
+  for (const [, value, type, path] of table.matchAll(/^ *\{ \(void\*\)&([\w.[\]-]+), TAG_(\w+), [^}]*\}, *\/\/ ([\w.[\]-]+)$/gm)) {
+    const indexes = Array.from(path.matchAll(/\[(-?\d+)\]/g), ([, index]) => Number(index));
+    const known = found.get(pattern(path));
+    if (known === undefined) {
+      found.set(pattern(path), { name: pattern(path), type, value: pattern(value), bounds: indexes.map((index) => [index, index]) });
+    } else {
+      indexes.forEach((index, i) => (known.bounds[i] = [Math.min(known.bounds[i][0], index), Math.max(known.bounds[i][1], index)]));
+    }
+  }
+  return [...found.values()];
+}
+
 const result = translate();
 const plan = {
   format: 1,
@@ -326,6 +344,7 @@ const plan = {
   files: [],
   pous: [],
   types: [],
+  symbols: [],
   configurations: [],
 };
 if (!result.success && plan.problems.length === 0) plan.problems.push({ place: [-1, 0, 0], text: 'STruC++ has failed, and has not said why' });
@@ -334,6 +353,11 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
+  plan.symbols = symbolsOf(result.debugTableCpp ?? '');
+  if (plan.symbols.length > kMostSymbols) {
+    found.remarks.push({ place: [-1, 0, 0], text: `${plan.symbols.length} variables: those beyond ${kMostSymbols} cannot be seen from outside` });
+    plan.symbols.length = kMostSymbols;
+  }
   // Its task for a program without one is not used.
   const warnings = result.warnings.filter((warning) => !warning.message.includes('has no task assignment'));
   plan.remarks = [...warnings.map(message), ...found.remarks].slice(0, kMostMessages);

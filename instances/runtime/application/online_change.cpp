@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/application/compare_versions.hpp"
+#include "shm/base/operations.hpp"
 
 namespace plchost {
 
@@ -118,8 +119,8 @@ std::string OnlineChange::describe() const {
                                                  : fmt::format("variables {} were carried over ({} bytes)",
                                                                first_of(copied_, ", "), bytes));
   if (!variables_.ended.empty())
-    text +=
-        fmt::format("; forces end, of variables that are not the same: {}", first_of(variables_.ended, ", "));
+    text += fmt::format("; {}, of variables that are not the same: {}",
+                        ended_forces_text(variables_.ended.size()), first_of(variables_.ended, ", "));
   return text;
 }
 

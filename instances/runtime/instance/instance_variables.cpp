@@ -8,6 +8,7 @@
 
 #include "instances/runtime/instance/instance.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/operations.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -116,7 +117,7 @@ void Instance::advance_values() {
 
 void Instance::log_ended_forces(std::string_view why) {
   if (!host_ || host_->variables().forces().size() == 0) return;
-  spdlog::warn("{} forces end, because {}: {}", host_->variables().forces().size(), why,
+  spdlog::warn("{}, because {}: {}", ended_forces_text(host_->variables().forces().size()), why,
                host_->variables().forced_names());
 }
 

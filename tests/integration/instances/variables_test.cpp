@@ -223,7 +223,7 @@ TEST_F(Variables, OfAnApplicationInExceptionAreReadOnly) {
   EXPECT_THAT(client_->texts(reply), ElementsAre("TRUE"));
   EXPECT_EQ(write("Main.crash=FALSE").code, ErrorCode::wrong_state);
   EXPECT_EQ(process_->end(SIGTERM), 0);
-  EXPECT_THAT(process_->log(), HasSubstr("1 forces end, because the process ends: Main.input"));
+  EXPECT_THAT(process_->log(), HasSubstr("1 force ended, because the process ends: Main.input"));
 }
 
 class StoppedVariables : public Variables {
@@ -249,7 +249,7 @@ TEST_F(Variables, ForcesGoOnInAnOnlineChange) {
   const auto old = client_->elements({"Main.count"});
   const ControlReply changed = process_->ask(ControlVerb::change_application, application("seen_2"));
   EXPECT_EQ(changed.code, ErrorCode::ok) << changed.text;
-  EXPECT_THAT(changed.text, HasSubstr("forces end, of variables that are not the same: Main.changed"));
+  EXPECT_THAT(changed.text, HasSubstr("1 force ended, of variables that are not the same: Main.changed"));
   EXPECT_EQ(client_->ask(old).code, ErrorCode::wrong_state);
   client_->open_table();
   EXPECT_EQ(read("Main.version"), "2");

@@ -108,6 +108,61 @@ TEST_F(Roles, APatchedClientMeetsNobodyWhereItsRoleDoesNotReach) {
   EXPECT_FALSE(RawClient::meets_writer(others, std::chrono::seconds(0)));
 }
 
+// [host] read_variables and write_variables: which roles may is what the host's configuration says.
+class RightsOfVariables : public SecuredHost {
+ protected:
+  void start_with(std::vector<std::string> rights) {
+    std::vector<std::string> options{"--identity", folder("cell")};
+    options.insert(options.end(), rights.begin(), rights.end());
+    host_.start_server(std::move(options));
+  }
+  /// Its instance has no process that could tell values. A client that may ask is told so.
+  void expect_read(const std::string& who, bool allowed, const std::string& needed) const {
+    const auto read = run(who, {"list", "variables", "line1"});
+    EXPECT_EQ(read.code, 1) << who;
+    EXPECT_THAT(read.errors, allowed ? HasSubstr("declares no variables")
+                                     : HasSubstr("this takes the role " + needed + " ([host] read_variables"))
+        << who;
+  }
+  void expect_written(const std::string& who, bool allowed) {
+    const std::size_t before = host_.requests().size();
+    for (const char* const verb : {"write", "force"}) {
+      const auto written = run(who, {verb, "variable", "line1", "Main.speed=5"});
+      EXPECT_EQ(written.code, allowed ? 0 : 1) << who << written.errors;
+      if (!allowed)
+        EXPECT_THAT(written.errors, HasSubstr("this takes the role engineer ([host] write_variables")) << who;
+    }
+    const auto ended = run(who, {"unforce", "variable", "line1", "Main.speed"});
+    EXPECT_EQ(ended.code, allowed ? 0 : 1) << who << ended.errors;
+    EXPECT_THAT(host_.requests(), SizeIs(before + (allowed ? 3 : 0)));
+  }
+};
+
+TEST_F(RightsOfVariables, AreThoseOfEngineersIfNothingIsSaid) {
+  start_with({});
+  expect_read("viewer", false, "engineer");
+  expect_read("operator", false, "engineer");
+  expect_read("engineer", true, "");
+  expect_read("admin", true, "");
+  expect_written("operator", false);
+  expect_written("engineer", true);
+}
+
+TEST_F(RightsOfVariables, AreThoseOfViewersAndOperatorsIfTheHostSaysSo) {
+  start_with({"--read-variables", "viewer", "--write-variables", "operator"});
+  for (const char* const who : {"viewer", "operator", "engineer"}) expect_read(who, true, "");
+  expect_written("operator", true);
+  const auto written = run("viewer", {"write", "variable", "line1", "Main.speed=5"});
+  EXPECT_EQ(written.code, 1);
+  EXPECT_THAT(written.errors, HasSubstr("plc/v1/op/request: the permissions of this identity"));
+}
+
+TEST_F(RightsOfVariables, ToReadMayBeThatOfOperators) {
+  start_with({"--read-variables", "operator"});
+  expect_read("viewer", false, "operator");
+  expect_read("operator", true, "");
+}
+
 // Permissions that say too much, as a mistake of their signer would be: the server looks at the role itself.
 class PermissionsThatSayTooMuch : public SecuredHost {
  protected:

@@ -6,6 +6,8 @@
 write_host cell $(seq "$first_core" "$last_core")
 write_instance cell line1 "$first_core" line_variables 'share_core = true'
 write_instance cell line2 "$first_core" task_faults 'share_core = true'
+cp "$cell/cell.toml" "$cell/two.toml"
+write_instance cell line3 "$first_core" line_variables 'share_core = true' 'restart = "never"'
 start_manager cell
 until_true 20 state_is line1 running
 
@@ -52,6 +54,13 @@ wait "${managers[0]}" 2>/dev/null || true
 start_manager cell
 until_true 20 state_is line1 running
 is "$(forces)" "line1 grid[1,1]=99 line1 line.total=7" || fail "$(plcctl list forces)"
+is "$(field line.total forced),$(field line.total forced_value),$(field line.setpoint forced)" "true,7,false" || fail "$(plcctl list variables line1)"
+is "$(plcctl read variable line1 line.total line.setpoint --json | jq -r 'map("\(.forced) \(.forced_value)") | join(",")')" "true 7,false " ||
+  fail "$(plcctl read variable line1 line.total line.setpoint --json)"
+plcctl read variable line1 line.total | grep -Eq '^line\.total +7 +7$' || fail "$(plcctl read variable line1 line.total)"
+plcctl watch variables line1 line.total --count 1 | grep -q '  forced$' || fail "watch does not say that it is forced"
+is "$(plcctl watch variables line1 line.total --count 1 --json | jq -r .forced)" true || fail "watch --json"
+is "$(instance line1 forces)" 2 || fail "$(instance line1 forces)"
 
 echo "- unforced: the program goes on with its own"
 plcctl unforce variable line1 line.total
@@ -71,11 +80,17 @@ awk -F, 'NR > 1 && $4 * 2 != $5 { exit 1 }' "$cell/record.csv" || fail "two valu
 
 echo "- a reset ends forces, and says so"
 plcctl force variable line1 line.total=7
-plcctl reset instance line1
+is "$(plcctl reset instance line1)" "line1: reset, and stopped; 1 force ended" || fail "the answer of a reset"
 is "$(forces)" "" || fail "$(plcctl list forces)"
 plcctl start instance line1
 until_true 10 follows 21
-plcctl logs line1 | grep -q '1 forces end, because' || fail "$(plcctl logs line1)"
+plcctl logs line1 | grep -q '1 force ended, because' || fail "$(plcctl logs line1)"
+plcctl force variable line1 line.total=7 'grid[1,1]=99'
+kill -KILL "$(instance line1 pid)"
+ended() { instance line1 problem | grep -q '; 2 forces ended'; }
+until_true 20 ended
+until_true 20 follows 21
+is "$(forces)" "" || fail "$(plcctl list forces)"
 
 echo "- an instance that stands still answers no longer, the others do"
 pid=$(instance line1 pid)
@@ -87,6 +102,17 @@ plcctl list instances >/dev/null
 kill -CONT "$pid"
 until_true 20 follows 21
 refused "declares no variables" plcctl list variables line2
+
+echo "- an instance that was killed, and then removed, leaves no table of its variables"
+table=/dev/shm/$pool-cell.variables.line3
+[ -e "$table" ] || fail "it has none"
+kill -KILL "$(instance line3 pid)"
+until_true 20 state_is line3 failed
+[ -e "$table" ] || fail "a process that was killed leaves none any more: this test shows nothing"
+cp "$cell/two.toml" "$cell/cell.toml"
+plcctl reload host >/dev/null
+gone() { [ ! -e "$table" ]; }
+until_true 20 gone
 
 kill -TERM "${managers[-1]}"
 wait "${managers[-1]}" || fail "the manager ended with $?"

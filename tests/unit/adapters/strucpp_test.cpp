@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "instances/adapters/iec/task_file.hpp"
@@ -57,6 +58,7 @@ struct Parts {
   std::string programs = R"({"name":"one","type":"MAIN","task":"FAST","place":[0,11,5]},)"
                          R"({"name":"two","type":"OTHER","task":"EDGE","place":[0,12,5]},)"
                          R"({"name":"rest","type":"IDLE","task":"","place":[0,13,5]})";
+  std::string symbols = R"({"name":"ONE.TOTAL","type":"DINT","value":"g_config.ONE.TOTAL","bounds":[]})";
   std::string head = R"("problems":[],"remarks":[])";
 
   [[nodiscard]] std::string text() const {
@@ -68,8 +70,8 @@ struct Parts {
            pou("program", "MAIN", main) + "," +
            pou("program", "OTHER", variable("GO", "BOOL", "section=external;member=")) + "," +
            pou("program", "IDLE", "") + "," + pou("function_block", "PUMP", variable("HOURS", "DINT")) + "," +
-           pou("function_block", "TON", variable("START_TIME", "IEC_TIME")) +
-           R"(],"types":[],"configurations":[{"name":"cell","place":[0,8,1],"globals":[)" + globals +
+           pou("function_block", "TON", variable("START_TIME", "IEC_TIME")) + R"(],"types":[],"symbols":[)" +
+           symbols + R"(],"configurations":[{"name":"cell","place":[0,8,1],"globals":[)" + globals +
            R"(],"resources":[{"name":"press","place":[0,8,1],"tasks":[)" + tasks + R"(],"programs":[)" +
            programs + "]}]}]}";
   }
@@ -93,7 +95,7 @@ iec::Glue glue_of(const Parts& parts, const std::string& task_file = "") {
   EXPECT_THAT(texts(plan.problems), IsEmpty());
   iec::Configuration& configuration = plan.project.configurations.at(0);
   EXPECT_THAT(texts(iec::read_task_file({"c.toml", task_file}, configuration)), IsEmpty());
-  return write_glue(plan.project, configuration, configuration.resources.at(0), plan.files);
+  return write_glue(plan.project, configuration, configuration.resources.at(0), plan.files, plan.symbols);
 }
 
 TEST(StrucppGlue, RunsEachTaskByItself) {
@@ -170,7 +172,7 @@ TEST(StrucppGlue, RefusesOutputsOfTwoTasksThatShareBits) {
   ReadPlan plan = read_plan(text, sources).value();
   const iec::Configuration& configuration = plan.project.configurations.at(0);
   EXPECT_THAT(
-      texts(write_glue(plan.project, configuration, configuration.resources.at(0), plan.files).problems),
+      texts(write_glue(plan.project, configuration, configuration.resources.at(0), plan.files, {}).problems),
       Contains(HasSubstr("%QX0.1 and %QX0.1 share bits, and the tasks fast, edge use them")));
 }
 
@@ -188,6 +190,80 @@ TEST(StrucppGlue, RefusesAnEdgeOfNoVariable) {
   parts.tasks.replace(parts.tasks.find(single), single.size(), R"("single":"NONE")");
   EXPECT_THAT(texts(glue_of(parts).problems),
               Contains("a.st:10:5: SINGLE of edge: 'NONE' is no BOOL of a VAR_GLOBAL"));
+}
+
+std::string symbol(const std::string& name, const std::string& type, const std::string& value,
+                   const std::string& bounds = "") {
+  return fmt::format(R"({{"name":"{}","type":"{}","value":"{}","bounds":[{}]}})", name, type, value, bounds);
+}
+
+TEST(StrucppSymbols, TellTheirTasksPlacesAndNamesOfTheSource) {
+  Parts parts;
+  parts.main = variable("raw", "INT", "at=%IW1") + "," + variable("pump", "PUMP", "member=PUMP_") + "," +
+               variable("Pumps.1", "PUMP", "member=PUMPS[1]") + "," + variable("link", "REFERENCE INT");
+  parts.symbols = symbol("ONE.RAW", "INT", "g_config.ONE.RAW") + "," +
+                  symbol("ONE.PUMP.HOURS", "DINT", "g_config.ONE.PUMP_.HOURS") + "," +
+                  symbol("ONE.PUMPS[].HOURS", "DINT", "g_config.ONE.PUMPS[].HOURS", "[1,2]") + "," +
+                  symbol("ONE.LINK", "INT", "g_config.ONE.LINK") + "," +
+                  symbol("OTHERS.X", "INT", "g_config.OTHERS.X") + "," + symbol("GO", "BOOL", "GO.value");
+  const std::string text = glue_of(parts).text;
+  EXPECT_THAT(text, HasSubstr("plchost_show<0>(use, g_config, [](auto& c) -> decltype((c.ONE.RAW)) { return "
+                              "c.ONE.RAW; },\n                  {\"one.raw\", 3u, 2u, 0u, \"fast\", "
+                              "\"%IW1\", {}});"));
+  EXPECT_THAT(text, HasSubstr("{\"one.pump.HOURS\", 4u, 4u, 0u, \"fast\", nullptr, {}}"));
+  EXPECT_THAT(text, HasSubstr("[](auto& c, long i0) -> decltype((plchost_at(c.ONE.PUMPS, i0).HOURS))"));
+  EXPECT_THAT(text, HasSubstr("{\"one.Pumps[].HOURS\", 4u, 4u, 0u, \"fast\", nullptr, {{1, 2u}, }}"));
+  EXPECT_THAT(text, HasSubstr("plchost_show<0>(use, strucpp::GO, [](auto& c) -> decltype((c.value))"));
+  EXPECT_THAT(text, HasSubstr("{\"GO\", 1u, 1u, 0u, nullptr, \"%IX0.0\", {}}")) << "two tasks use it";
+  EXPECT_THAT(text, Not(HasSubstr("LINK"))) << "it has no value of its own";
+  EXPECT_THAT(text, Not(HasSubstr("OTHERS")));
+}
+
+TEST(StrucppSymbols, OfArraysAreOneWithItsDimensions) {
+  Parts parts;
+  parts.symbols = symbol("SPEED[][].A[]", "TIME", "SPEED.value[][].A[]", "[-1,1],[0,3],[1,2]");
+  const std::string text = glue_of(parts).text;
+  EXPECT_THAT(text,
+              HasSubstr("plchost_show<3>(use, strucpp::SPEED, [](auto& c, long i0, long i1, long i2) -> "
+                        "decltype((plchost_at(plchost_at(c.value, i0, i1).A, i2)))"));
+  EXPECT_THAT(text, HasSubstr("{\"SPEED[][].A[]\", 16u, 8u, 0u, nullptr, nullptr, "
+                              "{{-1, 3u}, {0, 4u}, {1, 2u}, }}"));
+}
+
+TEST(StrucppSymbols, ThatCannotBeSeenAreTold) {
+  Parts parts;
+  parts.symbols = symbol("ONE.TOTAL", "WSTRING", "g_config.ONE.TOTAL") + "," +
+                  symbol("ONE.RAW[][].X[][]", "INT", "g_config.ONE.RAW[][].X[][]", "[0,1],[0,1],[0,1],[0,1]");
+  const iec::Glue glue = glue_of(parts);
+  EXPECT_THAT(glue.text, Not(HasSubstr("plchost_show<")));
+  EXPECT_THAT(texts(glue.remarks), Contains("a.st:4:7: one.TOTAL cannot be seen from outside: its type is "
+                                            "WSTRING"));
+  EXPECT_THAT(texts(glue.remarks), Contains("a.st:4:7: one.RAW[][].X[][] cannot be seen from outside: it has "
+                                            "more than 3 dimensions"));
+}
+
+TEST(StrucppPlan, RefusesSymbolsThatAreNone) {
+  const std::vector<std::string> sources{"a.st"};
+  for (const auto& [wrong, told] : std::vector<std::pair<std::string, std::string>>{
+           {symbol("ONE.A;B", "INT", "g_config.ONE.A"), "symbols[0].name is 'ONE.A;B'; allowed is names"},
+           {symbol("ONE..A", "INT", "g_config.ONE.A"), "symbols[0].name is 'ONE..A'; allowed is names"},
+           {symbol("", "INT", "g_config.ONE.A"), "symbols[0].name is ''; allowed is names"},
+           {symbol("ONE.A", "INT", "g_config.ONE.A."), "symbols[0].value is 'g_config.ONE.A.'; allowed"},
+           {symbol("ONE.A[", "INT", "g_config.ONE.A[", "[0,1]"), "symbols[0].name is 'ONE.A['; allowed"},
+           {symbol("ONE.A[]B", "INT", "g_config.ONE.A[]", "[0,1]"), "symbols[0].name is 'ONE.A[]B'; allowed"},
+           {symbol("ONE.A[]", "INT", "g_config.ONE.A[]"),
+            "symbols[0].bounds is '[]'; allowed is two numbers "
+            "for each []"},
+           {symbol("ONE.A[]", "INT", "g_config.ONE.A", "[0,1]"), "allowed is two numbers for each []"},
+           {symbol("ONE.A[]", "INT", "g_config.ONE.A[]", "[2,1]"),
+            "symbols[0].bounds[0] is '[2,1]'; allowed"},
+           {symbol("ONE.A", "IN T", "g_config.ONE.A"), "symbols[0].type is 'IN T'; allowed is a name"}}) {
+    Parts parts;
+    parts.symbols = wrong;
+    const auto plan = read_plan(parts.text(), sources);
+    ASSERT_FALSE(plan) << told;
+    EXPECT_THAT(plan.error().message, HasSubstr(told));
+  }
 }
 
 TEST(StrucppPlan, TellsWhatTheCompilerFound) {

@@ -5,6 +5,7 @@
 #include <contract_operations.hpp>
 #include <gtest/gtest.h>
 
+#include "api/server/access/request_check.hpp"
 #include "shm/base/operations.hpp"
 
 namespace plchost {
@@ -16,7 +17,7 @@ TEST(OperationTable, HasEachOperationOfTheContractAsItIsThere) {
     const Operation* const own = find_operation(told.number);
     ASSERT_NE(own, nullptr);
     EXPECT_EQ(own->name, told.name);
-    EXPECT_EQ(own->role == ApiRole::engineering, told.engineering);
+    EXPECT_EQ(request_topic(own->role).name, std::string("plc/v1/") + std::string(told.role) + "/request");
     EXPECT_EQ(own->names_instance, told.names_instance);
   }
 }

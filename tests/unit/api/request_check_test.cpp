@@ -32,24 +32,23 @@ Result<ControlRequest> check(const plc_Request& request, ApiRole role) {
 }
 
 TEST(RequestCheck, TakesTheNameAndTheValueOfAVariable) {
-  const auto engineering = [](std::int32_t operation, std::string_view argument) {
-    return check(make(operation, "line1", argument), ApiRole::engineering);
+  const auto asked = [](std::int32_t operation, std::string_view argument) {
+    return check(make(operation, "line1", argument), ApiRole::operating);
   };
   for (const auto operation : {plc_OPERATION_WRITE_VARIABLE, plc_OPERATION_FORCE_VARIABLE}) {
-    EXPECT_EQ(engineering(operation, "Line.speed=5")->argument, "Line.speed=5");
-    EXPECT_EQ(engineering(operation, "Line.text='a=b'")->argument, "Line.text='a=b'");
-    EXPECT_EQ(engineering(operation, "Line.text=")->argument, "Line.text=");
+    EXPECT_EQ(asked(operation, "Line.speed=5")->argument, "Line.speed=5");
+    EXPECT_EQ(asked(operation, "Line.text='a=b'")->argument, "Line.text='a=b'");
+    EXPECT_EQ(asked(operation, "Line.text=")->argument, "Line.text=");
     for (const char* const wrong : {"", "=5", "Line.speed", "Line.speed=\x1b[2J"}) {
-      const auto refused = engineering(operation, wrong);
+      const auto refused = asked(operation, wrong);
       ASSERT_FALSE(refused) << wrong;
       EXPECT_THAT(refused.error().message, HasSubstr("is not of the form NAME=VALUE"));
     }
-    EXPECT_FALSE(check(make(operation, "line1", "Line.speed=5"), ApiRole::operating)) << "for engineers";
   }
-  EXPECT_EQ(engineering(plc_OPERATION_UNFORCE_VARIABLE, "*")->argument, "*");
-  EXPECT_EQ(engineering(plc_OPERATION_UNFORCE_VARIABLE, "Grid[1,2]")->argument, "Grid[1,2]");
-  EXPECT_FALSE(engineering(plc_OPERATION_UNFORCE_VARIABLE, ""));
-  EXPECT_FALSE(engineering(plc_OPERATION_UNFORCE_VARIABLE, "a=5"));
+  EXPECT_EQ(asked(plc_OPERATION_UNFORCE_VARIABLE, "*")->argument, "*");
+  EXPECT_EQ(asked(plc_OPERATION_UNFORCE_VARIABLE, "Grid[1,2]")->argument, "Grid[1,2]");
+  EXPECT_FALSE(asked(plc_OPERATION_UNFORCE_VARIABLE, ""));
+  EXPECT_FALSE(asked(plc_OPERATION_UNFORCE_VARIABLE, "a=5"));
 }
 
 TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
@@ -73,7 +72,7 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_LIST_ROUTES, ""), ApiRole::operating)->verb, ControlVerb::list_routes);
   EXPECT_EQ(check(make(plc_OPERATION_READ_LOG), ApiRole::operating)->verb, ControlVerb::read_log);
   EXPECT_FALSE(check(make(plc_OPERATION_READ_LOG, ""), ApiRole::operating)) << "of one instance";
-  EXPECT_EQ(check(make(plc_OPERATION_LIST_VARIABLES), ApiRole::operating)->verb, ControlVerb::list_variables);
+  EXPECT_EQ(check(make(plc_OPERATION_LIST_VARIABLES), ApiRole::viewing)->verb, ControlVerb::list_variables);
   for (const char* task : {"", "Main"}) {
     const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
     EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);
@@ -91,6 +90,10 @@ TEST(RequestCheck, RefusesWhatIsNotForTheRole) {
   EXPECT_EQ(check(make(plc_OPERATION_SET_SCHEDULER, "line1", "x"), ApiRole::operating).error().code,
             ErrorCode::refused);
   EXPECT_EQ(check(make(plc_OPERATION_START), ApiRole::engineering).error().code, ErrorCode::refused);
+  const auto viewing = check(make(plc_OPERATION_START), ApiRole::viewing);
+  EXPECT_EQ(viewing.error().code, ErrorCode::refused);
+  EXPECT_THAT(viewing.error().message,
+              HasSubstr("does not belong to the topic plc/v1/all/request: write it to plc/v1/op/request"));
 }
 
 TEST(RequestCheck, NamesWhatDoesNotExist) {

@@ -80,6 +80,8 @@ constexpr std::array kTwoValues = {
     TwoValues{"[host]", "pool_mode", R"("0660")", R"("0600")"},
     TwoValues{"[host]", "cores", "[0, 1]", "[0, 1, 2]"},
     TwoValues{"[host]", "housekeeping_cores", "[0]", "[1]"},
+    TwoValues{"[host]", "read_variables", R"("viewer")", R"("operator")"},
+    TwoValues{"[host]", "write_variables", R"("operator")", R"("engineer")"},
     TwoValues{"[host]", "log_level", R"("info")", R"("debug")"},
     TwoValues{"[host]", "keep_pool", "false", "true"},
     TwoValues{"[dds]", "enabled", "true", "false"},

@@ -165,6 +165,56 @@ TEST_F(ManagedInstanceTest, RestartOfARunningOneThatOutlastsItsClientRunsAgain) 
   EXPECT_EQ(state(), InstanceState::running);
 }
 
+TEST_F(ManagedInstanceTest, TellsHowManyForcesHaveEndedWithTheProcess) {
+  const auto force = [this](std::uint32_t count) {
+    host_.page.emplace();
+    host_.page->pid = sut().status().pid;
+    host_.page->forces = count;
+  };
+  const auto renew = [this](ControlVerb verb) {
+    ask(verb);
+    host_.page.reset();  // it takes its page away
+    sut().on_exit(exited_with(0));
+    report_ready();
+    return take_reply().text;
+  };
+  bring_up();
+  force(2);
+  EXPECT_EQ(renew(ControlVerb::restart), "line1: restarted; 2 forces ended");
+  EXPECT_EQ(renew(ControlVerb::restart), "") << "none was forced";
+  force(1);
+  EXPECT_EQ(renew(ControlVerb::reset), "line1: reset, and stopped; 1 force ended");
+  force(0);
+  EXPECT_EQ(renew(ControlVerb::reset_cold), "");
+}
+
+TEST_F(ManagedInstanceTest, TellsHowManyForcesHaveEndedWithACommandThatFailed) {
+  bring_up();
+  host_.page.emplace();
+  host_.page->pid = sut().status().pid;
+  host_.page->forces = 3;
+  ask(ControlVerb::restart);
+  sut().on_exit(exited_with(0));
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_THAT(take_reply().text, testing::EndsWith("; 3 forces ended"));
+}
+
+TEST_F(ManagedInstanceTest, ACrashTellsHowManyForcesHaveEnded) {
+  bring_up();
+  host_.page.emplace();
+  host_.page->pid = sut().status().pid;
+  host_.page->forces = 2;
+  sut().on_exit(killed_by(SIGSEGV));
+  EXPECT_THAT(problem(), HasSubstr("; 2 forces ended"));
+  expire_timer();
+  report_ready();
+  EXPECT_THAT(problem(), HasSubstr("; 2 forces ended"));
+  ask(ControlVerb::restart);
+  sut().on_exit(exited_with(0));
+  report_ready();
+  EXPECT_EQ(take_reply().text, "") << "they have ended before";
+}
+
 TEST_F(ManagedInstanceTest, RestartEndsAStubbornProcessByForce) {
   bring_up();
   ask(ControlVerb::restart);

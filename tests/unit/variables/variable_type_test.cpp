@@ -55,7 +55,7 @@ void expect_refused(VariableType type, std::initializer_list<std::string_view> t
 }
 
 TEST(VariableType, NumbersAreThoseOfTheCInterface) {
-  EXPECT_EQ(variable_types().size(), PLC_TYPE_COUNTED_STRING);
+  EXPECT_EQ(variable_types().size(), PLC_TYPE_DAYS_DATE);
   std::uint32_t number = 1;
   for (const VariableTypeTraits& type : variable_types()) {
     EXPECT_EQ(std::to_underlying(type.type), number);
@@ -282,6 +282,32 @@ TEST(VariableType, CountedStringsHaveTheirLengthInFront) {
   Bytes large(400);
   ASSERT_TRUE(parse_variable(VariableType::counted_string, std::string(255, 'x'), large));
   EXPECT_FALSE(parse_variable(VariableType::counted_string, std::string(256, 'x'), large));
+}
+
+TEST(VariableType, SizedStringsHaveTheirLengthBehind) {
+  Bytes value(10, std::byte{0xff});
+  ASSERT_TRUE(parse_variable(VariableType::sized_string, "'abc'", value));
+  EXPECT_EQ(value, text_memory(std::string_view("abc\0\0\0\0\0\3\0", 10), 10));
+  EXPECT_EQ(variable_text(VariableType::sized_string, value), "'abc'");
+  EXPECT_EQ(again(VariableType::sized_string, "123456"), "'123456'");
+  expect_refused(VariableType::sized_string, {"1234567", "'a$00b'"});
+  // A length that is longer than the memory, and memory that has no room for one.
+  EXPECT_EQ(variable_text(VariableType::sized_string, text_memory("abc\xff\xff", 5)), "'ab'");
+  EXPECT_EQ(variable_text(VariableType::sized_string, text_memory("abc", 3)), "''");
+  Bytes small(3);
+  EXPECT_TRUE(parse_variable(VariableType::sized_string, "", small));
+  EXPECT_FALSE(parse_variable(VariableType::sized_string, "a", small));
+}
+
+TEST(VariableType, DatesInDaysAreDates) {
+  Bytes value(8);
+  ASSERT_TRUE(parse_variable(VariableType::days_date, "D#1970-01-11", value));
+  EXPECT_EQ(value[0], std::byte{10});
+  EXPECT_EQ(again(VariableType::days_date, "D#2026-11-25"), "D#2026-11-25");
+  EXPECT_EQ(again(VariableType::days_date, "1969-12-31"), "D#1969-12-31");
+  expect_refused(VariableType::days_date, {"10", "D#2026-11-25-12:30:00"});
+  std::ranges::fill(value, std::byte{0x7f});
+  EXPECT_EQ(variable_text(VariableType::days_date, value), "9187201950435737471");
 }
 
 TEST(VariableType, ALongTextIsCut) {

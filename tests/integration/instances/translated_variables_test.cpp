@@ -1,0 +1,122 @@
+// The variables of Structured Text that MATIEC or STruC++ has translated: seen, written and forced from
+// outside, while a real plc-instance runs it.
+#include <cstdlib>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/adapters/run_program.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+#include "tests/integration/instances/value_client.hpp"
+
+namespace plchost::testing {
+namespace {
+
+/// By the compiler of that name.
+class VariablesOfTranslatedText : public ::testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    const char* const variable = GetParam() == "matiec" ? "PLCHOST_MATIEC" : "PLCHOST_STRUCPP";
+    const char* const folder = std::getenv(variable);
+    if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "needs " << variable;
+  }
+  void start(const std::string& text) {
+    const std::string application = sandbox.folder() + "/shown.so";
+    const auto built = run_program({PLCCTL, "build", "application", sandbox.write("shown.st", text), "-o",
+                                    application, "--compiler", GetParam()},
+                                   sandbox.folder());
+    ASSERT_TRUE(built && built->success()) << (built ? built->output : built.error().describe());
+    sut = std::make_unique<InstanceProcess>(sandbox, std::vector<std::string>{"--application", application});
+    sut->wait_until_up();
+  }
+
+  Sandbox sandbox;
+  std::unique_ptr<InstanceProcess> sut;
+};
+
+INSTANTIATE_TEST_SUITE_P(By, VariablesOfTranslatedText, ::testing::Values("matiec", "strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
+
+constexpr const char* kShown = R"(
+TYPE Point : STRUCT x : REAL; tags : ARRAY[1..3] OF INT; END_STRUCT; END_TYPE
+FUNCTION_BLOCK Pump
+  VAR_INPUT go : BOOL; END_VAR
+  VAR hours : LREAL; END_VAR
+  IF go THEN hours := hours + 1.0; END_IF;
+END_FUNCTION_BLOCK
+PROGRAM Main
+  VAR_EXTERNAL total : DINT; END_VAR
+  VAR
+    rate : INT;
+    twice : INT;
+    pump1 : Pump;
+    p : Point;
+    grid : ARRAY[0..1, 1..2] OF INT;
+    text1 : STRING := 'press';
+    pause : TIME := T#1s500ms;
+    day1 : DATE := D#2026-11-25;
+  END_VAR
+  VAR lamp AT %QX0.1 : BOOL; END_VAR
+  twice := rate * 2;
+  total := total + 1;
+  pump1(go := lamp);
+  p.tags[2] := twice;
+  grid[1,2] := rate;
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL total : DINT; END_VAR
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM one WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(VariablesOfTranslatedText, AreSeenWrittenAndForcedFromOutside) {
+  start(kShown);
+  ValueClient client(sandbox);
+  const auto soon = [&](const std::string& name, const std::string& value) {
+    return eventually([&] { return client.read(name) == value; });
+  };
+  const auto ask = [&](ControlVerb verb, const std::string& argument) { return sut->ask(verb, argument); };
+  const auto write = [&](const std::string& argument) { return ask(ControlVerb::write_variable, argument); };
+  const auto symbol = [&](const std::string& name) {
+    return client.table().symbols()[client.table().find(name)->symbol];
+  };
+  EXPECT_EQ(type_text(symbol("one.grid[0,1]")), "ARRAY [0..1, 1..2] OF INT");
+  EXPECT_EQ(symbol("one.rate").task, "fast");
+  EXPECT_EQ(symbol("one.lamp").area, "%QX0.1");
+  EXPECT_EQ(write("one.rate=21").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.twice", "42"));
+  EXPECT_TRUE(soon("one.p.tags[2]", "42"));
+  EXPECT_EQ(client.read("one.p.tags[1]"), "0");
+  EXPECT_TRUE(soon("one.grid[1,2]", "21"));
+  EXPECT_EQ(write("one.p.tags[3]=-3").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("one.p.tags[3]"), "-3");
+  EXPECT_EQ(write("one.p.x=1.5").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("one.p.x"), "1.5");
+  EXPECT_EQ(client.read("one.text1"), "'press'");
+  EXPECT_EQ(write("one.text1='it$'s'").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("one.text1"), "'it$'s'");
+  EXPECT_EQ(client.read("one.pause"), "T#1s500ms");
+  EXPECT_EQ(write("one.pause=T#-2s").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("one.pause"), "T#-2s");
+  EXPECT_EQ(client.read("one.day1"), "D#2026-11-25");
+  EXPECT_EQ(write("one.day1=D#2027-01-31").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("one.day1"), "D#2027-01-31");
+  EXPECT_EQ(ask(ControlVerb::force_variable, "one.rate=5").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.twice", "10"));
+  EXPECT_EQ(ask(ControlVerb::force_variable, "total=100").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("total", "100"));
+  EXPECT_EQ(client.read("one.pump1.hours"), "0.0");
+  EXPECT_EQ(ask(ControlVerb::force_variable, "one.lamp=TRUE").code, ErrorCode::ok);
+  EXPECT_TRUE(eventually([&] { return client.read("one.pump1.hours") != "0.0"; }));
+  EXPECT_EQ(sut->runtime().forces, 3);
+  EXPECT_EQ(ask(ControlVerb::unforce_variable, "*").code, ErrorCode::ok);
+  EXPECT_TRUE(eventually([&] { return client.read("total") != "100"; }));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Who may read, write and force variables: engineers, until the host's configuration gives it to others. Each write and force is
+# in the audit log with its principal.
+. "$(dirname "$0")/common.sh"
+
+plant=$cell/plant
+export PLCHOST_SECURITY=$plant
+as() { plcctl --identity "$plant/$1" "${@:2}"; }
+
+plcctl security init "$plant" cell1 >/dev/null
+plcctl security add-identity viewer panel >/dev/null
+plcctl security add-identity operator anna >/dev/null
+plcctl security add-identity engineer otto >/dev/null
+write_host cell1 "$first_core"
+printf '[dds]\nidentity = "plant/cell1"\n' >>"$cell/cell1.toml"
+write_instance cell1 line1 "$first_core" line_variables
+start_manager cell1
+running() { is "$(as panel list instances --json | jq -r '.[0].state')" running; }
+until_true 20 running
+value() { as "$1" read variable line1 "$2" --json | jq -r '.[0].value'; }
+
+echo "- engineers, if nothing is said"
+is "$(value otto line.setpoint)" 20 || fail "$(value otto line.setpoint)"
+as otto write variable line1 line.setpoint=21
+as otto force variable line1 line.total=7
+as otto unforce variable line1 line.total
+for who in panel anna; do
+  refused "this takes the role engineer ([host] read_variables of this host says so)" as "$who" read variable line1 line.setpoint
+  refused "[host] read_variables" as "$who" list variables line1
+  refused "[host] read_variables" as "$who" watch variables line1 line.setpoint --count 1
+done
+refused "'anna' is operator; this takes the role engineer ([host] write_variables of this host says so)" \
+  as anna write variable line1 line.setpoint=22
+refused "[host] write_variables" as anna force variable line1 line.setpoint=22
+refused "[host] write_variables" as anna unforce variable line1 --all
+is "$(value otto line.setpoint)" 21 || fail "a refused value was written: $(value otto line.setpoint)"
+
+echo "- viewers and operators, by two keys of [host]"
+sed -i '/^pool = /a read_variables = "viewer"\nwrite_variables = "operator"' "$cell/cell1.toml"
+as otto reload host | grep -q '^\[host\] read_variables changed, used at once; plchost-dds is restarted' || fail "the answer of the reload"
+reads() { is "$(value panel line.setpoint)" 21; }
+until_true 20 reads
+as anna write variable line1 line.setpoint=23
+as anna force variable line1 line.total=8
+is "$(value panel line.total)" 8 || fail "$(value panel line.total)"
+is "$(as panel list forces --json | jq -r 'map("\(.name)=\(.forced_value)") | join(" ")')" "line.total=8" || fail "$(as panel list forces)"
+refused "plc/v1/op/request: the permissions of this identity do not allow it" as panel write variable line1 line.setpoint=24
+as anna unforce variable line1 --all
+is "$(value anna line.setpoint)" 23 || fail "$(value anna line.setpoint)"
+
+echo "- in the audit log, each with its principal"
+audit=$cell/cell1.state/audit.cell1
+told() { cat "$1"/audit.*.log | jq -r 'select(.what | test("variable")) | "\(.who): \(.what) \(.argument)"'; }
+is "$(told "$audit")" "engineer otto: write variable line.setpoint=21
+engineer otto: force variable line.total=7
+engineer otto: unforce variable line.total
+operator anna: write variable line.setpoint=23
+operator anna: force variable line.total=8
+operator anna: unforce variable *" || fail "$(told "$audit")"
+told "$audit/refused" | grep -q '^operator anna: write variable line.setpoint=22$' || fail "$(told "$audit/refused")"
+plcctl verify audit "$audit" >/dev/null || fail "$(plcctl verify audit "$audit")"
+
+kill -TERM "${managers[0]}"
+wait "${managers[0]}" || fail "the manager ended with $?"
+nothing_left
