@@ -116,6 +116,7 @@ class Build {
       context_.fail({configuration().place, "this CONFIGURATION runs no program"});
     }
     if (context_.good()) read_task_file();
+    if (context_.good()) projects_.add_events(context_.project.configurations.front());
     return context_.good();
   }
   void read_task_file() {

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
@@ -11,7 +10,9 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/verbs/exported_instance.hpp"
 #include "api/cli/verbs/host_commands.hpp"
+#include "api/cli/verbs/variable_sampler.hpp"
 #include "api/dds/text.hpp"
 #include "instances/adapters/plcopen/write_project.hpp"
 
@@ -20,8 +21,6 @@ namespace plchost {
 namespace {
 
 using plcopen::ExportedHost;
-using plcopen::ExportedInstance;
-using plcopen::ExportedTask;
 
 std::string time_now() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
@@ -31,15 +30,12 @@ std::string time_now() {
                      parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
 }
 
-ExportedTask task_of(const plc_TaskStatus& task) {
-  constexpr std::array<ExportedTask::Kind, 4> kKinds{ExportedTask::Kind::cyclic, ExportedTask::Kind::event,
-                                                     ExportedTask::Kind::external,
-                                                     ExportedTask::Kind::freewheeling};
-  return {.name = std::string(dds::text_of(task.task)),
-          .kind = kKinds.at(std::min<std::size_t>(task.kind, kKinds.size() - 1)),
-          .priority = task.priority,
-          .interval_ns = task.interval_ns,
-          .event = std::string(dds::text_of(task.external_event))};
+/// Those that the application of an instance declares: none, if it has no application.
+Result<std::vector<plc_VariableRecord>> variables_of(CliSession& session, const std::string& host,
+                                                     const std::string& instance) {
+  auto variables = VariableSampler(session, host, instance, {}).all();
+  if (variables || variables.error().code != ErrorCode::not_found) return variables;
+  return std::vector<plc_VariableRecord>();
 }
 
 /// Of the instances of a host that are wanted: empty: all of them.
@@ -50,13 +46,10 @@ Result<ExportedHost> host_of(CliSession& session, const std::string& host,
   PLCHOST_TRY_ASSIGN(const auto instances, client->instances(host, session.deadline()));
   PLCHOST_TRY_ASSIGN(const auto tasks, client->tasks(host, session.deadline()));
   for (const plc_InstanceStatus& instance : instances) {
-    ExportedInstance one{
-        .name = std::string(dds::text_of(instance.instance)), .tasks = {}, .programs = {}, .variables = {}};
-    if (!wanted.empty() && std::ranges::find(wanted, one.name) == wanted.end()) continue;
-    for (const plc_TaskStatus& task : tasks) {
-      if (dds::text_of(task.instance) == one.name) one.tasks.push_back(task_of(task));
-    }
-    exported.instances.push_back(std::move(one));
+    const std::string name(dds::text_of(instance.instance));
+    if (!wanted.empty() && std::ranges::find(wanted, name) == wanted.end()) continue;
+    PLCHOST_TRY_ASSIGN(const auto variables, variables_of(session, host, name));
+    exported.instances.push_back(exported_instance(name, tasks, variables));
   }
   return exported;
 }
@@ -95,9 +88,8 @@ void add_export_verb(const Command& plcctl, CliSession& session, const std::stri
   const auto names = std::make_shared<std::vector<std::string>>();
   plcctl.verb("export", "Write what runs as a file of another tool")
       .noun("plant",
-            "Write the tasks of the instances as PLCopen TC6 XML: a configuration for each host, a resource "
-            "for "
-            "each instance",
+            "Write tasks, programs and variables of the instances as PLCopen TC6 XML: a configuration for "
+            "each host, a resource for each instance",
             [&session, names, version] { return export_plant(session, *names, version); })
       .optional("INSTANCE", *names, "only these; 'line*' stands for all that begin with line");
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "instances/adapters/iec/source_place.hpp"
@@ -14,6 +15,13 @@ struct BodyLine {
   unsigned line = 0;  ///< of the XML file
 };
 
+/// A task that an external event runs, for which ST has no words.
+struct TaskEvent {
+  std::string resource;
+  std::string task;
+  std::string event;
+};
+
 /// ST that is made from XML, and where in the XML each of its lines stands.
 class GeneratedText {
  public:
@@ -22,8 +30,10 @@ class GeneratedText {
   void add_body(const std::vector<BodyLine>& lines, const std::string& pou);
   /// The last line of a POU: errors about the end of its body are told there.
   void end_body(std::string_view line);
+  void add(TaskEvent event) { events_.push_back(std::move(event)); }
 
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
+  [[nodiscard]] const std::vector<TaskEvent>& events() const noexcept { return events_; }
   /// A problem of this text becomes one of the XML.
   void restore(iec::SourceProblem& problem) const;
 
@@ -37,6 +47,7 @@ class GeneratedText {
   std::string text_;
   std::vector<Origin> origins_;  // of each line
   std::vector<std::string> pous_;
+  std::vector<TaskEvent> events_;
 };
 
 }  // namespace plchost::plcopen

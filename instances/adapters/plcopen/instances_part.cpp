@@ -15,6 +15,7 @@
 #include "instances/adapters/plcopen/declarations.hpp"
 #include "instances/adapters/plcopen/iso_duration.hpp"
 #include "instances/adapters/plcopen/structured_text.hpp"
+#include "instances/adapters/plcopen/write_elements.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost::plcopen {
@@ -73,6 +74,7 @@ class ConfigurationReader {
   void add_resource(const xml_node& resource) {
     const std::string name = file_.identifier(resource, "name", where_);
     where_ = "resource " + name;
+    resource_ = name;
     programs_.clear();
     std::vector<xml_node> tasks;
     std::vector<xml_node> globals;
@@ -122,6 +124,15 @@ class ConfigurationReader {
     if (priority.empty() || !std::ranges::all_of(priority, [](char c) { return c >= '0' && c <= '9'; }))
       refuse(task, fmt::format("task {}: priority '{}' is no number", name, shown(priority)));
     text_.add(fmt::format("TASK {} ({}PRIORITY := {});", name, parts, priority), file_.line_of(task));
+    add_event(task, name);
+  }
+
+  void add_event(const xml_node& task, const std::string& name) {
+    const std::string event = external_event_of(task);
+    if (event.empty()) return;
+    if (const auto good = check_name("the name of an event", event, kMaxEventName); !good)
+      return refuse(task, fmt::format("task {}: {}", name, good.error().message));
+    text_.add(TaskEvent{.resource = resource_, .task = name, .event = event});
   }
 
   std::string interval_of(const xml_node& task, const std::string& name) {
@@ -179,6 +190,7 @@ class ConfigurationReader {
   ProjectFile& file_;
   GeneratedText& text_;
   std::string where_;
+  std::string resource_;
   std::vector<Program> programs_;            // of this resource
   std::map<std::string, unsigned> numbers_;  // of the names that were given, by the folded type
 };

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/plcopen/declarations.hpp"
 #include "shm/base/names.hpp"
 
@@ -167,7 +168,16 @@ class PouReader {
     if (file_.name_of(source) != "ST") return;
     std::vector<BodyLine> lines = FormattedText(file_, where_).lines_in(source);
     if (lines.empty()) lines.push_back({"", file_.line_of(source)});
+    if (has_no_statement(lines))
+      file_.remark(source, fmt::format("{}: its body has no statement, so it does nothing", where_));
     text_.add_body(lines, pou);
+  }
+  static bool has_no_statement(const std::vector<BodyLine>& lines) {
+    std::string body;
+    for (const BodyLine& line : lines) body += line.text + "\n";
+    return std::ranges::all_of(iec::tokens_of(body, "").all, [](const iec::Token& token) {
+      return token.is(";") || token.is("RETURN") || token.kind == iec::Token::Kind::end;
+    });
   }
 
   ProjectFile& file_;

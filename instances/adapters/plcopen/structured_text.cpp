@@ -83,6 +83,20 @@ iec::Source ProjectSources::take(const iec::Source& xml, iec::SourceProblems& pr
   return source;
 }
 
+void ProjectSources::add_events(iec::Configuration& configuration) const {
+  for (const auto& [file, text] : texts_) {
+    for (const TaskEvent& one : text.events()) {
+      for (iec::Resource& resource : configuration.resources) {
+        if (iec::folded(resource.name) != iec::folded(one.resource)) continue;
+        const auto task = std::ranges::find(resource.tasks, iec::folded(one.task),
+                                            [](const iec::Task& known) { return iec::folded(known.name); });
+        if (task == resource.tasks.end() || task->extension.place.line != 0) continue;
+        task->extension.external_event = one.event;
+      }
+    }
+  }
+}
+
 void ProjectSources::restore(iec::SourceProblems& problems, iec::SourceProblems& remarks) const {
   for (auto* const told : {&problems, &remarks}) {
     for (iec::SourceProblem& problem : *told) {

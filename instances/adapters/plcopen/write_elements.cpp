@@ -17,6 +17,10 @@ namespace {
 using iec::folded;
 using pugi::xml_node;
 
+/// Of the data that plchost adds to a task.
+constexpr const char* kTaskData = "https://plchost/task";
+constexpr const char* kTaskElement = "PlchostTask";
+
 /// The words of a type in ST, as PLCopen has them.
 class TypeElements {
  public:
@@ -104,6 +108,17 @@ void document(xml_node element, const std::string& text) {
 
 std::string told_name(std::string_view name, std::string_view written) {
   return name == written ? "" : fmt::format("its name in plchost is {}", name);
+}
+
+void add_external_event(xml_node task, const std::string& event) {
+  xml_node data = add(task.append_child("addData"), "data", kTaskData);
+  set(data, "handleUnknown", "preserve");
+  set(data.append_child(kTaskElement), "external_event", printable(event));
+}
+
+std::string external_event_of(const xml_node& task) {
+  const xml_node data = task.child("addData").find_child_by_attribute("name", kTaskData);
+  return data.child(kTaskElement).attribute("external_event").value();
 }
 
 void add_type(xml_node parent, std::string_view type) {

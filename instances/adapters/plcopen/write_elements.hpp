@@ -29,6 +29,11 @@ class Names {
 /// The words of its documentation, if a name is not written as it is; else empty.
 [[nodiscard]] std::string told_name(std::string_view name, std::string_view written);
 
+/// Of a task: the elements of PLCopen know none.
+void add_external_event(pugi::xml_node task, const std::string& event);
+/// The one that add_external_event() has written; empty: none.
+[[nodiscard]] std::string external_event_of(const pugi::xml_node& task);
+
 /// A type in ST, as the element of PLCopen.
 void add_type(pugi::xml_node parent, std::string_view type);
 

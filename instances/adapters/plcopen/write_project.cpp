@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <pugixml.hpp>
 
+#include "instances/adapters/iec/place.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/plcopen/iso_duration.hpp"
 #include "instances/adapters/plcopen/project_file.hpp"
@@ -24,15 +25,28 @@ using pugi::xml_node;
 
 /// A variable, or a structure of those behind it.
 struct Member {
-  std::string name;
+  std::string name;    // "PUMP"
+  std::string bounds;  // "[1..4]" of an array of structures
   const ExportedVariable* variable = nullptr;
   std::vector<Member> members;
 };
 
 // Those of one structure stand one behind the other.
-Member& member_of(std::vector<Member>& members, std::string_view name) {
-  if (!members.empty() && members.back().name == name) return members.back();
-  return members.emplace_back(std::string(name), nullptr, std::vector<Member>());
+Member& structure_of(std::vector<Member>& members, std::string_view word) {
+  const std::size_t bracket = std::min(word.find('['), word.size());
+  const std::string_view name = word.substr(0, bracket);
+  const std::string_view bounds = word.substr(bracket);
+  if (!members.empty() && members.back().variable == nullptr && members.back().bounds == bounds &&
+      folded(members.back().name) == folded(name))
+    return members.back();
+  return members.emplace_back(std::string(name), std::string(bounds), nullptr, std::vector<Member>());
+}
+
+// None of those in bounds.
+std::size_t dot_in(std::string_view path) {
+  const std::size_t first = path.find_first_of(".[");
+  if (first == std::string_view::npos || path[first] == '.') return first;
+  return path.find('.', std::min(path.find(']', first), path.size()));
 }
 
 std::vector<Member> tree_of(const std::vector<ExportedVariable>& variables) {
@@ -41,13 +55,12 @@ std::vector<Member> tree_of(const std::vector<ExportedVariable>& variables) {
     std::vector<Member>* level = &roots;
     std::string_view path = variable.path;
     for (int depth = 0;; ++depth) {
-      const std::size_t dot = depth < kMostDepth ? path.find('.') : std::string_view::npos;
-      Member& member = member_of(*level, path.substr(0, dot));
+      const std::size_t dot = depth < kMostDepth ? dot_in(path) : std::string_view::npos;
       if (dot == std::string_view::npos) {
-        member.variable = &variable;
+        level->emplace_back(std::string(path), "", &variable, std::vector<Member>());
         break;
       }
-      level = &member.members;
+      level = &structure_of(*level, path.substr(0, dot)).members;
       path.remove_prefix(dot + 1);
     }
   }
@@ -62,7 +75,7 @@ class Declared {
     pous_ = types.append_child("pous");
   }
 
-  /// A program with these variables, which has no body; the name that it gets.
+  /// A program with these variables, whose body does nothing; the name that it gets.
   std::string pou(const std::string& type, const std::vector<Member>& variables) {
     pugi::xml_document content;
     xml_node interface = content.append_child("interface");
@@ -71,6 +84,8 @@ class Declared {
       xml_node pou = add(pous_, "pou", name);
       set(pou, "pouType", "program");
       pou.append_copy(interface);
+      pou.append_child("body").append_child("ST").append_child("xhtml:p").text() =
+          "(* plchost does not know the body of a program. *) RETURN;";
       document(pou, told_name(type, name));
     });
   }
@@ -101,16 +116,23 @@ class Declared {
   void add_variable(xml_node list, const Member& member, Names& names, const std::string& owner) {
     const std::string name = names.of(member.name);
     xml_node variable = add(list, "variable", name);
-    if (member.variable != nullptr && !member.variable->address.empty())
-      set(variable, "address", member.variable->address);
+    std::vector<std::string> words;
+    if (std::string other = told_name(member.name, name); !other.empty()) words.push_back(std::move(other));
+    if (const std::string address = member.variable == nullptr ? "" : member.variable->address;
+        owner.empty() && iec::place_of(folded(address))) {
+      set(variable, "address", address);
+    } else if (!address.empty()) {
+      words.push_back("it lies at " + address);
+    }
     const xml_node type = variable.append_child("type");
-    if (member.members.empty()) {
+    if (member.variable != nullptr) {
       add_type(type, member.variable->type);
     } else {
       const std::string wanted = owner.empty() ? name + "_type" : fmt::format("{}_{}", owner, name);
-      add(type, "derived", structure(wanted, member.members));
+      const std::string of = structure(wanted, member.members);
+      add_type(type, member.bounds.empty() ? of : fmt::format("ARRAY {} OF {}", member.bounds, of));
     }
-    document(variable, told_name(member.name, name));
+    document(variable, fmt::format("{}", fmt::join(words, "; ")));
   }
 
   xml_node data_types_;
@@ -122,16 +144,20 @@ class Declared {
 void Declared::add_sections(xml_node parent, const char* section, const std::vector<Member>& members) {
   struct SectionKind {
     const char* attribute;
-    bool retain, constant;
+    bool retain, constant, located;  // iec2c wants sections of their own for located variables
   };
-  constexpr std::array<SectionKind, 3> kSectionKinds{
-      {{.attribute = nullptr, .retain = false, .constant = false},
-       {.attribute = "retain", .retain = true, .constant = false},
-       {.attribute = "constant", .retain = false, .constant = true}}};
+  constexpr std::array<SectionKind, 6> kSectionKinds{{{nullptr, false, false, false},
+                                                      {"retain", true, false, false},
+                                                      {"constant", false, true, false},
+                                                      {nullptr, false, false, true},
+                                                      {"retain", true, false, true},
+                                                      {"constant", false, true, true}}};
   const auto belongs = [](const Member& member, const SectionKind& kind) {
-    const bool constant = member.variable != nullptr && member.variable->constant;
-    const bool retain = member.variable != nullptr && member.variable->retain && !constant;
-    return constant == kind.constant && retain == kind.retain;
+    const ExportedVariable* const variable = member.variable;
+    const bool constant = variable != nullptr && variable->constant;
+    const bool retain = variable != nullptr && variable->retain && !constant;
+    const bool located = variable != nullptr && !variable->address.empty();
+    return constant == kind.constant && retain == kind.retain && located == kind.located;
   };
   Names names;
   for (const SectionKind& kind : kSectionKinds) {
@@ -185,11 +211,13 @@ class Writer {
     const xml_node configuration = add(parent, "configuration", name);
     Names names;
     for (const ExportedInstance& instance : host.instances)
-      add_instance(configuration, instance, names.of(instance.name));
+      add_instance(configuration, instance, names.of(instance.name), host.instances.size() == 1);
     document(configuration, told_name(host.name, name));
   }
 
-  void add_instance(xml_node parent, const ExportedInstance& instance, const std::string& name) {
+  // STruC++ knows no globals of a resource, so they stand in the configuration, if it has one resource only.
+  void add_instance(xml_node parent, const ExportedInstance& instance, const std::string& name,
+                    bool is_only) {
     const xml_node resource = add(parent, "resource", name);
     std::vector<Member> members = tree_of(instance.variables);
     std::map<std::string, std::string> types;  // of the programs, as they are written
@@ -200,10 +228,14 @@ class Writer {
           declared_.pou(program.type, found == members.end() ? std::vector<Member>() : found->members);
       if (found != members.end()) members.erase(found);
     }
-    // Names of tasks and of programs may not be the same in ST.
+    // Names of tasks, programs and globals may not be the same in ST.
     Names names;
+    for (const Member& member : members) (void)names.of(member.name);
+    edges_.clear();
     for (const ExportedTask& task : instance.tasks) add_task(resource, task, instance, types, names);
-    declared_.add_sections(resource, "globalVars", members);
+    const xml_node owner = is_only ? parent : resource;
+    declared_.add_sections(owner, "globalVars", members);
+    add_edges(owner);
     for (const ExportedProgram& program : instance.programs) {
       if (program.task.empty()) add_program(resource, program, types, names);
     }
@@ -226,18 +258,32 @@ class Writer {
     const std::string name = names.of(task.name);
     const xml_node element = add(resource, "task", name);
     if (task.kind == Kind::cyclic) set(element, "interval", time_literal(task.interval_ns));
-    if (task.kind == Kind::event && !task.event.empty()) set(element, "single", task.event);
+    if (task.kind == Kind::event)
+      set(element, "single", task.event.empty() ? edge_of(name, names) : task.event);
     set(element, "priority", std::to_string(task.priority));
     for (const ExportedProgram& program : instance.programs) {
       if (!program.task.empty() && is_of_task(program)) add_program(element, program, types, names);
     }
     std::vector<std::string> words;
-    if (task.kind == Kind::external) words.push_back("the external event " + task.event + " runs it");
+    if (task.kind == Kind::external) {
+      add_external_event(element, task.event);
+      words.push_back("the external event " + task.event + " runs it");
+    }
     if (task.kind == Kind::freewheeling) words.emplace_back("it is freewheeling");
     if (task.kind == Kind::event && task.event.empty())
-      words.emplace_back("it runs at each rising edge of a variable");
+      words.emplace_back("it runs at each rising edge of a variable, whose name plchost does not know");
     if (std::string other = told_name(task.name, name); !other.empty()) words.push_back(std::move(other));
     document(element, fmt::format("{}", fmt::join(words, "; ")));
+  }
+  // The variable of an edge that is not known gets a name.
+  std::string edge_of(const std::string& task, Names& names) {
+    return edges_.emplace_back(names.of("edge_of_" + task));
+  }
+  void add_edges(xml_node resource) const {
+    if (edges_.empty()) return;
+    xml_node list = resource.append_child("globalVars");
+    for (const std::string& name : edges_) add_type(add(list, "variable", name).append_child("type"), "BOOL");
+    document(list, "plchost does not know the true ones");
   }
   static void add_program(xml_node parent, const ExportedProgram& program,
                           const std::map<std::string, std::string>& types, Names& names) {
@@ -249,6 +295,7 @@ class Writer {
 
   pugi::xml_document document_;
   Declared declared_;
+  std::vector<std::string> edges_;  // of the tasks of a resource
 };
 
 }  // namespace

@@ -23,9 +23,11 @@ struct ExportedProgram {
 };
 
 struct ExportedVariable {
-  std::string path;     ///< "MAIN.PUMP.HOURS" of a program or a structure; of a global "LIMIT"
+  /// "MAIN.PUMP.HOURS" of a program or a structure, "MAIN.PUMP[1..4].HOURS" of an array of them; of a global
+  /// "LIMIT".
+  std::string path;
   std::string type;     ///< in ST: "INT", "ARRAY[1..3] OF INT", "STRING(80)", the name of another type
-  std::string address;  ///< "%IX0.0"; empty: none
+  std::string address;  ///< "%IX0.0"; another text is told in a documentation; empty: none
   bool retain = false;
   bool constant = false;
 };
@@ -49,7 +51,8 @@ struct ExportedPlant {
 };
 
 /// PLCopen TC6 XML 2.01: each host is a configuration, each instance a resource. Bodies are not known, so
-/// POUs have none. Names become those that ST allows; where they differ, a documentation tells them.
+/// those of POUs have no statement. Names become those that ST allows; where they differ, a documentation
+/// tells them.
 [[nodiscard]] std::string project_of(const ExportedPlant& plant);
 
 }  // namespace plchost::plcopen

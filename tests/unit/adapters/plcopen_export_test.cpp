@@ -41,13 +41,19 @@ ExportedPlant plant_of(std::vector<ExportedInstance> instances) {
   return {.product_version = "1", .time = "2026-01-31T12:00:00", .hosts = {{"cell1", std::move(instances)}}};
 }
 
-/// As a build reads it. That its POUs have no bodies is all that is wrong with it.
+/// As a build reads it.
 iec::Project read_again(const std::string& xml) {
-  const StructuredText read = structured_text_of({"plant.xml", xml});
-  for (const auto& problem : read.problems) EXPECT_THAT(problem.text, HasSubstr("it has no body"));
-  const std::vector<iec::Source> sources{{"plant.xml", read.text.text()}};
-  auto [project, problems] = iec::read_project(sources);
-  EXPECT_THAT(problems, IsEmpty()) << read.text.text();
+  ProjectSources sut;
+  iec::SourceProblems problems;
+  iec::SourceProblems remarks;
+  const std::vector<iec::Source> sources{sut.take({"plant.xml", xml}, problems)};
+  EXPECT_THAT(problems, IsEmpty());
+  sut.restore(problems, remarks);
+  EXPECT_FALSE(remarks.empty());
+  for (const auto& remark : remarks) EXPECT_THAT(remark.text, HasSubstr("its body has no statement"));
+  auto [project, wrong] = iec::read_project(sources);
+  EXPECT_THAT(wrong, IsEmpty()) << sources.front().text;
+  for (iec::Configuration& configuration : project.configurations) sut.add_events(configuration);
   return project;
 }
 
@@ -63,13 +69,16 @@ TEST(PlcopenExport, HasTasksProgramsAndVariablesThatTheBuildReads) {
   EXPECT_EQ(resource.tasks[0].priority, 1);
   EXPECT_EQ(resource.tasks[1].single, "go");
   EXPECT_EQ(resource.tasks[2].name, "done");
+  EXPECT_EQ(resource.tasks[2].extension.external_event, "product");
+  EXPECT_EQ(resource.tasks[0].extension.external_event, "");
   ASSERT_EQ(resource.programs.size(), 3U);
   EXPECT_EQ(resource.programs[0].type, "Main");
   EXPECT_EQ(resource.programs[0].task, "fast");
   EXPECT_EQ(resource.programs[2].task, "") << "it is freewheeling";
-  ASSERT_EQ(resource.globals.size(), 2U);
-  EXPECT_EQ(resource.globals[0].location, "%IX0.0");
-  EXPECT_TRUE(resource.globals[1].constant);
+  const std::vector<iec::Variable>& globals = project.configurations[0].globals;
+  ASSERT_EQ(globals.size(), 2U);
+  EXPECT_TRUE(globals[0].constant);
+  EXPECT_EQ(globals[1].location, "%IX0.0");
   const iec::Pou* const main = project.pou("Main");
   ASSERT_NE(main, nullptr);
   std::vector<std::string> declarations;
@@ -77,8 +86,9 @@ TEST(PlcopenExport, HasTasksProgramsAndVariablesThatTheBuildReads) {
     declarations.push_back(variable.name + " " + variable.location + ": " + variable.type +
                            (variable.retain ? ", retained" : ""));
   }
-  EXPECT_THAT(declarations, ElementsAre("NAMES : ARRAY[1..3, 0..1] OF STRING[80]", "SPEED %QW1: INT(- 5..5)",
-                                        "PUMP : Pump", "TIMER : TIMER_type", "COUNT : DINT, retained"));
+  EXPECT_THAT(declarations,
+              ElementsAre("NAMES : ARRAY[1..3, 0..1] OF STRING[80]", "PUMP : Pump", "TIMER : TIMER_type",
+                          "COUNT : DINT, retained", "SPEED %QW1: INT(- 5..5)"));
   ASSERT_EQ(project.types.size(), 1U);
   EXPECT_EQ(project.types[0].definition, "TIMER_TYPE : STRUCT IN : BOOL ; ET : TIME ; END_STRUCT ; ");
 }
@@ -91,11 +101,50 @@ TEST(PlcopenExport, TellsWhatStHasNoWordsFor) {
                  {.name = "a_b", .kind = Kind::event, .priority = 3, .interval_ns = 0, .event = ""}};
   const std::string renamed = project_of(plant_of({line(), other}));
   EXPECT_THAT(renamed, HasSubstr("it is freewheeling; its name in plchost is a b"));
-  EXPECT_THAT(renamed, HasSubstr("it runs at each rising edge of a variable; its name in plchost is a_b"));
+  EXPECT_THAT(renamed,
+              HasSubstr("it runs at each rising edge of a variable, whose name plchost does not know; its "
+                        "name in plchost is a_b"));
   const iec::Project project = read_again(renamed);
   ASSERT_EQ(project.configurations.at(0).resources.size(), 2U);
   EXPECT_EQ(project.configurations[0].resources[1].name, "line_2_b");
-  EXPECT_EQ(project.configurations[0].resources[1].tasks.at(1).name, "a_b_2");
+  const iec::Resource& resource = project.configurations[0].resources[1];
+  EXPECT_EQ(resource.tasks.at(1).name, "a_b_2");
+  EXPECT_EQ(resource.tasks[1].single, "edge_of_a_b_2");
+  ASSERT_EQ(resource.globals.size(), 1U);
+  EXPECT_EQ(resource.globals[0].name + resource.globals[0].type, "edge_of_a_b_2BOOL");
+}
+
+TEST(PlcopenExport, HasArraysOfStructuresAndAddressesThatStAllows) {
+  ExportedInstance one{.name = "line1", .tasks = {}, .programs = {}, .variables = {}};
+  one.variables = {{.path = "lamp", .type = "BOOL", .address = "%QX0.1"},
+                   {.path = "odd", .type = "INT", .address = "DB1.4"},
+                   {.path = "pump[1..4].hours", .type = "ARRAY [0..2] OF INT", .address = "%IW4"},
+                   {.path = "PUMP[1..4].speed", .type = "REAL", .address = ""},
+                   {.path = "pump2", .type = "INT", .address = ""},
+                   {.path = "pump2.more", .type = "INT", .address = ""}};
+  one.tasks = {{.name = "fast", .kind = Kind::cyclic, .priority = 1, .interval_ns = 1'000'000, .event = ""}};
+  one.programs = {{.name = "main", .type = "Main", .task = "fast"}};
+  const std::string xml = project_of(plant_of({one}));
+  EXPECT_THAT(xml, HasSubstr("it lies at DB1.4"));
+  EXPECT_THAT(xml, HasSubstr("it lies at %IW4"));
+  const iec::Project project = read_again(xml);
+  std::vector<std::string> globals;
+  for (const iec::Variable& variable : project.configurations.at(0).globals)
+    globals.push_back(variable.name + " " + variable.location + ": " + variable.type);
+  EXPECT_THAT(globals, ElementsAre("pump : ARRAY[1..4] OF pump_type", "pump2 : INT", "pump2_2 : pump2_2_type",
+                                   "lamp %QX0.1: BOOL", "odd : INT"));
+  ASSERT_EQ(project.types.size(), 2U);
+  EXPECT_EQ(project.types[0].definition,
+            "PUMP_TYPE : STRUCT HOURS : ARRAY [ 0 .. 2 ] OF INT ; SPEED : REAL ; END_STRUCT ; ");
+}
+
+TEST(PlcopenExport, RefusesAnEventWhoseNameIsNone) {
+  std::string xml = project_of(plant_of({line()}));
+  xml.replace(xml.find("external_event=\"product\""), 24, "external_event=\"a b\"");
+  const StructuredText read = structured_text_of({"plant.xml", xml});
+  ASSERT_EQ(read.problems.size(), 1U);
+  EXPECT_THAT(read.problems[0].text, HasSubstr("task done: the name of an event"));
+  EXPECT_THAT(read.text.events(), IsEmpty());
 }
 
 TEST(PlcopenExport, TellsProgramsOfOneNameApartIfTheirVariablesAre) {

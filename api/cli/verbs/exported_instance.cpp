@@ -1,0 +1,114 @@
+#include "api/cli/verbs/exported_instance.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/dds/text.hpp"
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost {
+
+namespace {
+
+using plcopen::ExportedInstance;
+using plcopen::ExportedProgram;
+using plcopen::ExportedTask;
+using plcopen::ExportedVariable;
+using ExportedKind = ExportedTask::Kind;
+
+ExportedTask task_of(const plc_TaskStatus& task) {
+  constexpr std::array<ExportedKind, 4> kKinds{ExportedKind::cyclic, ExportedKind::event,
+                                               ExportedKind::external, ExportedKind::freewheeling};
+  return {.name = std::string(dds::text_of(task.task)),
+          .kind = kKinds.at(std::min<std::size_t>(task.kind, kKinds.size() - 1)),
+          .priority = task.priority,
+          .interval_ns = task.interval_ns,
+          .event = std::string(dds::text_of(task.external_event))};
+}
+
+// "Pump[].speed[][]" as ARRAY [1..4, 0..2, 0..3] OF INT: "Pump[1..4].speed", ARRAY [0..2, 0..3] OF INT.
+ExportedVariable variable_of(const plc_VariableRecord& record) {
+  ExportedVariable variable{.path = "", .type = "", .address = std::string(dds::text_of(record.area))};
+  std::string_view type = dds::text_of(record.type);
+  std::string_view bounds;  // "1..4, 0..2, 0..3"
+  if (const std::size_t begin = type.find(" ["); type.starts_with("ARRAY")) {
+    const std::size_t end = type.find("] OF ");
+    if (begin == std::string_view::npos || end == std::string_view::npos) return variable;
+    bounds = type.substr(begin + 2, end - begin - 2);
+    type.remove_prefix(end + 5);
+  }
+  std::string here;  // the bounds of the word that is read
+  for (std::string_view name = dds::text_of(record.name); !name.empty();) {
+    if (name.starts_with("[]")) {
+      const std::size_t comma = bounds.find(", ");
+      here += fmt::format("{}{}", here.empty() ? "" : ", ", bounds.substr(0, comma));
+      bounds.remove_prefix(comma == std::string_view::npos ? bounds.size() : comma + 2);
+      name.remove_prefix(2);
+      continue;
+    }
+    if (!here.empty()) variable.path += "[" + std::exchange(here, {}) + "]";
+    variable.path += name.front();
+    name.remove_prefix(1);
+  }
+  // The compilers have different words for the length of a text.
+  if (type.starts_with("STRING[")) type = "STRING";
+  variable.type = here.empty() ? std::string(type) : fmt::format("ARRAY [{}] OF {}", here, type);
+  return variable;
+}
+
+/// Those of one first word.
+struct VariableGroup {
+  std::string word;
+  std::string task;  ///< of all of them; empty: several, or any
+};
+
+std::vector<VariableGroup> groups_of(std::span<const plc_VariableRecord> variables) {
+  std::vector<VariableGroup> groups;
+  for (const plc_VariableRecord& variable : variables) {
+    const std::string_view name = dds::text_of(variable.name);
+    const std::size_t dot = name.find('.');
+    if (dot == std::string_view::npos || name.substr(0, dot).contains('[')) continue;
+    const std::string_view task = dds::text_of(variable.task);
+    if (groups.empty() || iec::folded(groups.back().word) != iec::folded(name.substr(0, dot))) {
+      groups.push_back({.word = std::string(name.substr(0, dot)), .task = std::string(task)});
+    } else if (groups.back().task != task) {
+      groups.back().task.clear();
+    }
+  }
+  std::erase_if(groups, [](const VariableGroup& group) { return group.task.empty(); });
+  return groups;
+}
+
+}  // namespace
+
+ExportedInstance exported_instance(std::string_view name, std::span<const plc_TaskStatus> tasks,
+                                   std::span<const plc_VariableRecord> variables) {
+  ExportedInstance instance{.name = std::string(name), .tasks = {}, .programs = {}, .variables = {}};
+  for (const plc_VariableRecord& variable : variables) instance.variables.push_back(variable_of(variable));
+  const std::vector<VariableGroup> groups = groups_of(variables);
+  for (const plc_TaskStatus& one : tasks) {
+    if (dds::text_of(one.instance) != name) continue;
+    const ExportedTask& task = instance.tasks.emplace_back(task_of(one));
+    const std::size_t before = instance.programs.size();
+    for (const VariableGroup& group : groups) {
+      if (group.task != task.name) continue;
+      // In ST a program without a task is a freewheeling one of its own name.
+      const bool is_the_task =
+          task.kind == ExportedKind::freewheeling && iec::folded(group.word) == iec::folded(task.name);
+      instance.programs.push_back(
+          {.name = group.word, .type = group.word + "_type", .task = is_the_task ? "" : task.name});
+    }
+    if (instance.programs.size() > before) continue;
+    const bool freewheels = task.kind == ExportedKind::freewheeling;
+    const std::string program = freewheels ? task.name : task.name + "_program";
+    instance.programs.push_back(
+        {.name = program, .type = program + "_type", .task = freewheels ? "" : task.name});
+  }
+  return instance;
+}
+
+}  // namespace plchost
