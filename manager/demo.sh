@@ -193,7 +193,7 @@ until_true 5 "further cycles of line1" further_cycles
 show list tasks line1
 
 # No compiler for Structured Text is a part of plchost.
-if [ -n "${PLCHOST_MATIEC:-}" ] || command -v iec2c >/dev/null; then
+if [ -n "${PLCHOST_MATIEC:-}${PLCHOST_STRUCPP:-}" ] || command -v iec2c strucpp >/dev/null; then
   title "a program in Structured Text for the bottling line"
   show build application instances/examples/traffic_light/traffic_light.st -o "$work/traffic_light.so"
   show load application line1 "$work/traffic_light.so"
@@ -202,7 +202,7 @@ if [ -n "${PLCHOST_MATIEC:-}" ] || command -v iec2c >/dev/null; then
   show list tasks line1
   show load application line1 --on-host "$applications/bottling_line.so"
 else
-  echo "(left out: a program in Structured Text, which needs a compiler: PLCHOST_MATIEC, or iec2c in PATH)"
+  echo "(left out: a program in Structured Text, which needs a compiler: PLCHOST_MATIEC or PLCHOST_STRUCPP, iec2c or strucpp in PATH)"
 fi
 
 if [ "$keep" = yes ]; then
