@@ -444,6 +444,19 @@ TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
   EXPECT_THAT(built.output, HasSubstr("there is no iec2c with its lib folder in"));
 }
 
+TEST_F(StructuredText, WhereNoCompilerIsFoundSaysHowToGetEach) {
+  const ProgramEnd built = run_program({"/usr/bin/env", "-u", "PLCHOST_MATIEC", "-u", "PLCHOST_STRUCPP", "PATH=/",
+                                        PLCCTL, "build", "application", sandbox.write("twice.st", kTwice),
+                                        "-o", so("twice")},
+                                       sandbox.folder())
+                               .value();
+  EXPECT_EQ(built.exit_code, 1);
+  EXPECT_THAT(built.output, HasSubstr("there is no compiler for Structured Text"));
+  EXPECT_THAT(built.output, HasSubstr("name its folder by --matiec or PLCHOST_MATIEC"));
+  EXPECT_THAT(built.output, HasSubstr("name its folder by --strucpp or PLCHOST_STRUCPP"));
+  EXPECT_FALSE(std::filesystem::exists(so("twice")));
+}
+
 TEST_F(StructuredText, IsTranslatedByTheCompilerThatIsNamed) {
   const std::string source = sandbox.write("twice.st", kTwice);
   const auto said = [&](std::vector<std::string> options) {

@@ -82,6 +82,21 @@ export PKG_CONFIG_PATH=$prefix/lib/pkgconfig
   gcc -std=c89 "$documents/instances/examples/parts_feeder/walk.c" -o "$cell/walk" $(pkg-config --cflags --libs plcpool); } \
   2>"$cell/gcc.log" || fail "not built by pkg-config"
 
+echo "- Structured Text, with the installed sources of the adapters"
+light=$documents/instances/examples/traffic_light/traffic_light.st
+said=$(env -u PLCHOST_MATIEC -u PLCHOST_STRUCPP PATH="$cell" "$prefix/bin/plcctl" build application "$light" -o "$cell/light.so" 2>&1) &&
+  fail "built without a compiler"
+grep -q "there is no compiler for Structured Text.*PLCHOST_MATIEC.*PLCHOST_STRUCPP" <<<"$said" || fail "$said"
+for compiler in matiec strucpp; do
+  folder=PLCHOST_${compiler^^}
+  [ -n "${!folder:-}" ] || { echo "  left out: a build by $compiler, which needs $folder"; continue; }
+  "$prefix/bin/plcctl" build application "$light" -o "$cell/$compiler.so" --compiler $compiler --keep "$cell/$compiler" >"$cell/$compiler.log" 2>&1 ||
+    fail "not built by $compiler"
+  "$prefix/bin/plc-instance" --check-application "$cell/$compiler.so" | grep -q "lights: cyclic, priority 5, every 20000 us" || fail "$compiler"
+done
+said=$(PLCHOST_MATIEC='' PLCHOST_STRUCPP="$cell" "$prefix/bin/plcctl" build application "$light" -o "$cell/light.so" 2>&1) && fail "built by no STruC++"
+grep -q "npm ci --ignore-scripts && npm run build" <<<"$said" || fail "$said"
+
 echo "- a host of the installed programs runs the control program, and the others reach it"
 BIN=$prefix/bin APPLICATIONS=$cell/project/build
 write_host north "$first_core"
