@@ -25,6 +25,15 @@ std::string first_lines(const std::string& text) {
   return result;
 }
 
+void BuildContext::refuse_persistent(const iec::Project& read, const char* compiler) {
+  for (const iec::SourcePlace& place : read.persistent) {
+    fail({place,
+          fmt::format("PERSISTENT: {} does not know this word; write RETAIN, whose values are kept over "
+                      "restarts and power cuts, until a cold reset",
+                      compiler)});
+  }
+}
+
 bool BuildContext::open_folder() {
   auto folder = order.keep.empty() ? WorkFolder::make_temporary() : WorkFolder::make_kept(order.keep);
   if (!has(folder)) return false;
@@ -66,7 +75,8 @@ std::optional<std::vector<std::string>> BuildContext::words_of(const char* varia
 
 std::vector<std::string> BuildContext::application_files() const {
   const std::string folder = adapters() + "/application/";
-  return {folder + "application.c", folder + "places.c", folder + "symbols.c", folder + "variables.c"};
+  return {folder + "application.c", folder + "copies.c", folder + "places.c", folder + "symbols.c",
+          folder + "variables.c"};
 }
 
 }  // namespace plchost

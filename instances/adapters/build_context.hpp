@@ -35,6 +35,8 @@ class BuildContext {
     return result.has_value();
   }
 
+  /// Each PERSISTENT is a problem.
+  void refuse_persistent(const iec::Project& read, const char* compiler);
   /// Makes the folder for the files between. Once.
   bool open_folder();
   [[nodiscard]] const WorkFolder& folder() const { return *folder_; }

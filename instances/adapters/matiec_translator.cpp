@@ -28,6 +28,7 @@ class MatiecTranslator : public Translator {
     auto [project, problems] = iec::read_project(context_.sources);
     context_.project = std::move(project);
     std::ranges::move(problems, std::back_inserter(context_.report.problems));
+    context_.refuse_persistent(context_.project, "MATIEC");
     if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
     return context_.good();
   }

@@ -125,8 +125,9 @@ class StrucppTranslator : public Translator {
 
   // Of some things of the language it says only that another word was expected.
   void explain() {
-    for (const iec::Configuration& configuration :
-         iec::read_project(context_.sources).project.configurations) {
+    const iec::Project project = iec::read_project(context_.sources).project;
+    context_.refuse_persistent(project, "STruC++");
+    for (const iec::Configuration& configuration : project.configurations) {
       for (const iec::Resource& resource : configuration.resources) {
         for (const iec::Variable& global : resource.globals) {
           context_.fail(

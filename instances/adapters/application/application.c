@@ -80,7 +80,7 @@ int CDECL plc_app_init(void) {
   unsigned int i;
   infos = calloc(plchost_task_count, sizeof *infos);
   now = calloc(plchost_task_count, sizeof *now);
-  if (infos == NULL || now == NULL) return 1;
+  if (infos == NULL || now == NULL || !plchost_prepare_copies()) return 1;
   plchost_bind();
   if (!plchost_declare_places() || !plchost_declare_variables() || !plchost_declare_symbols()) return 1;
   for (i = 0; i < plchost_task_count; ++i) fill(&infos[i], &plchost_tasks[i]);
@@ -95,6 +95,7 @@ int CDECL plc_app_init(void) {
 }
 
 void CDECL plc_app_exit(void) {
+  plchost_forget_copies();
   plchost_forget_places();
   plchost_forget_variables();
   free(infos);

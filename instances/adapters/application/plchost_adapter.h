@@ -1,8 +1,8 @@
 /*
  * Between the files of an application that a compiler for IEC 61131-3 has translated: the one that `plcctl
  * build application` writes, in C or C++, in which the program and its types are, and those that know the
- * runtime: application.c, places.c, symbols.c and variables.c. All names are in lower case: those of the
- * program are in upper case, so none of them can be the same.
+ * runtime: application.c, copies.c, places.c, symbols.c and variables.c. All names are in lower case: those
+ * of the program are in upper case, so none of them can be the same.
  */
 #ifndef PLCHOST_ADAPTER_H
 #define PLCHOST_ADAPTER_H
@@ -64,6 +64,17 @@ struct plchost_variable {
   int retain;
 };
 
+/* A global of which a program has a copy. */
+struct plchost_copy {
+  void* global;
+  void* copy;
+  void* before; /* the copy as it was taken */
+  unsigned int bytes;
+  unsigned int piece; /* bytes that are exchanged at a time: of an array those of an element */
+  /* Calls `work` while no task uses the global; null: the globals of the compiler have no locks. */
+  void (*locked)(const struct plchost_copy* copy, void (*work)(const struct plchost_copy* copy));
+};
+
 /* A variable that can be seen from outside, as in plc_variables.h. */
 struct plchost_symbol {
   const char* name;
@@ -95,6 +106,12 @@ void plchost_bind(void); /* makes the program ready for its first cycle */
 /* From application.c: around each cycle of a task. */
 void plchost_begin(unsigned int task);
 void plchost_end(unsigned int task);
+
+/* From copies.c: around the code of a program. Preparing returns 0 if it fails. */
+int plchost_prepare_copies(void);
+void plchost_forget_copies(void);
+void plchost_take_copies(const struct plchost_copy* copies, unsigned int count);
+void plchost_put_copies(const struct plchost_copy* copies, unsigned int count);
 
 /* From places.c. Declaring returns 0 if that fails. */
 int plchost_declare_places(void);

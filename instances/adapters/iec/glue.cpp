@@ -31,10 +31,12 @@ GlueWriter::GlueWriter(const Project& project, const Configuration& configuratio
     : project_(project),
       configuration_(configuration),
       resource_(resource),
+      compiler_(compiler),
       plan_(plan_tasks(project, configuration, resource, compiler)),
       variables_(variables_of(project, resource, plan_, compiler)) {
   std::ranges::copy(variables_.remarks, std::back_inserter(plan_.remarks));
   number_retained();
+  find_copies();
 }
 
 Glue GlueWriter::write() {
@@ -43,6 +45,7 @@ Glue GlueWriter::write() {
   find_places();
   find_aliases();
   write_storage();
+  write_copies();
   write_places();
   refuse_shared_bits();
   for (std::size_t i = 0; i < plan_.tasks.size(); ++i) write_task(plan_.tasks[i], i);
@@ -51,6 +54,49 @@ Glue GlueWriter::write() {
   write_symbols();
   write_binding();
   return {std::move(text_), std::move(plan_.problems), std::move(plan_.remarks)};
+}
+
+void GlueWriter::find_copies() {
+  for (const PlannedTask& task : plan_.tasks) {
+    for (const Program* const program : task.programs) {
+      ProgramCopies copies = copies_of(project_, resource_, plan_, *program, compiler_);
+      std::ranges::move(copies.remarks, std::back_inserter(plan_.remarks));
+      if (copies.all.empty()) continue;
+      copies_of_programs_[program] = {.first = copies_.size(), .count = copies.all.size()};
+      std::ranges::move(copies.all, std::back_inserter(copies_));
+    }
+  }
+}
+
+void GlueWriter::write_copies() {
+  if (copies_.empty()) return;
+  std::string rows;
+  for (std::size_t i = 0; i < copies_.size(); ++i) {
+    const CopyText text = copy(copies_[i], i);
+    print("{}\n", text.storage);
+    rows += fmt::format("  {{0, &{0}, &plchost_before_{1}, sizeof {0}, sizeof {2}, {3}}},\n", text.value, i,
+                        text.piece, text.locked);
+  }
+  print("static struct plchost_copy plchost_copies[] = {{\n{}}};\n", rows);
+}
+
+void GlueWriter::write_copy_bindings() {
+  for (std::size_t i = 0; i < copies_.size(); ++i) {
+    const CopyText text = copy(copies_[i], i);
+    print("  plchost_copies[{}].global = {};\n", i, text.global);
+    for (const std::string& external : copies_[i].externals)
+      print("  {}{} = &plchost_copy_{};\n", external, text.external_end, i);
+  }
+}
+
+void GlueWriter::write_call(const Program& program) {
+  const auto copies = copies_of_programs_.find(&program);
+  if (copies == copies_of_programs_.end()) return print("  {}\n", call(program));
+  const auto [first, count] = copies->second;
+  print(
+      "  plchost_take_copies(&plchost_copies[{0}], {1});\n  {2}\n  plchost_put_copies(&plchost_copies[{0}], "
+      "{1});\n",
+      first, count, call(program));
 }
 
 void GlueWriter::write_symbols() {
@@ -117,7 +163,7 @@ void GlueWriter::write_task(const PlannedTask& task, std::size_t number) {
   const std::size_t uses = write_uses(number);
   print("static const unsigned int plchost_retained_{}[] = {{{}}};\n", number, list_of(retained_by(number)));
   print("static void plchost_run_{0}(void) {{\n  plchost_begin({0});\n", number);
-  for (const Program* const program : task.programs) print("  {}\n", call(*program));
+  for (const Program* const program : task.programs) write_call(*program);
   print("  plchost_end({});\n}}\n", number);
   if (!task.single.empty()) write_edge(task, number);
   if (task.extension.options) write_options(*task.extension.options, number);

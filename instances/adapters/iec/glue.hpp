@@ -3,14 +3,17 @@
 #include <cstddef>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/compiler.hpp"
+#include "instances/adapters/iec/copies.hpp"
 #include "instances/adapters/iec/place.hpp"
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/task_plan.hpp"
@@ -56,6 +59,18 @@ class GlueWriter {
   virtual void write_storage() {}
   /// A statement.
   [[nodiscard]] virtual std::string call(const Program& program) const = 0;
+  /// The parts of a copy of a global, with its number: plchost_copy_3 and plchost_before_3.
+  struct CopyText {
+    std::string storage;            ///< the definitions of both
+    std::string value;              ///< the one with the value, for `&` and sizeof
+    std::string piece;              ///< sizeof of what is exchanged at a time
+    std::string locked = "0";       ///< see plchost_copy
+    std::string global;             ///< the address of the global
+    std::string_view external_end;  ///< behind each VAR_EXTERNAL: the pointer in it
+  };
+  [[nodiscard]] virtual CopyText copy(const CopiedGlobal& global, std::size_t number) const = 0;
+  /// Statements of plchost_bind(): the programs with copies use them.
+  void write_copy_bindings();
   /// The value of a global that is no memory place, as an expression.
   [[nodiscard]] virtual std::string global(const std::string& name) const = 0;
   /// Adds with `add(place, value)` the inputs that the task exchanges with variables of its own, and returns
@@ -83,6 +98,9 @@ class GlueWriter {
   [[nodiscard]] static Place place_or_none(const Variable& variable);
 
  private:
+  void find_copies();
+  void write_copies();
+  void write_call(const Program& program);
   void write_places();
   void find_aliases();
   void refuse_shared_bits();
@@ -96,11 +114,19 @@ class GlueWriter {
   void write_tasks();
   void write_variables();
 
+  struct CopyRange {
+    std::size_t first = 0;
+    std::size_t count = 0;
+  };
+
   const Project& project_;
   const Configuration& configuration_;
   const Resource& resource_;
+  Compiler compiler_;
   TaskPlan plan_;
   ProgramVariables variables_;
+  std::vector<CopiedGlobal> copies_;
+  std::map<const Program*, CopyRange> copies_of_programs_;
   std::vector<Known> places_;
   std::vector<std::vector<std::size_t>> groups_;  // of places that share bits
   std::vector<std::size_t> use_counts_;

@@ -146,7 +146,9 @@ class ProjectReader {
         begin.retain = true;
       } else if (take("CONSTANT")) {
         begin.constant = true;
-      } else if (!take("NON_RETAIN") && !take("PERSISTENT")) {
+      } else if (at("PERSISTENT")) {
+        project_.persistent.push_back(take().place);
+      } else if (!take("NON_RETAIN")) {
         break;
       }
     }

@@ -58,6 +58,7 @@ struct Program {
   bool connected = false;  ///< variables stand in parentheses behind its type
   bool retain = false;     ///< all its variables are retained
   SourcePlace place;
+  bool copies_globals = false;   ///< each of its cycles sees one value of each global
   TaskExtension extension = {};  ///< of its own task, if it runs without one
 };
 
@@ -89,6 +90,7 @@ class Project {
   std::vector<DeclaredType> types;
   std::vector<Configuration> configurations;
   std::map<std::string, SourcePlace> locations;  ///< each %... in the sources, folded, where it stands first
+  std::vector<SourcePlace> persistent;           ///< each PERSISTENT: no compiler knows the word
 
   /// The first one of this name.
   [[nodiscard]] const Pou* pou(std::string_view name) const;

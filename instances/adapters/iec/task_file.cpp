@@ -30,6 +30,7 @@ using namespace std::string_view_literals;
 // In the order of their enumerators.
 constexpr std::array kLatePolicies = {"next"sv, "asap"sv};
 constexpr std::array kWatchdogPolicies = {"application"sv, "task"sv};
+constexpr std::array kGlobals = {"shared"sv, "copy"sv};
 static_assert(std::to_underlying(LatePolicy::asap) == 1);
 static_assert(std::to_underlying(WatchdogPolicy::task) == 1);
 
@@ -47,6 +48,12 @@ struct KnownTask {
   std::int64_t interval_ns;  ///< of a cyclic one; 0: it is another one
 };
 
+struct KnownProgram {
+  const Resource* resource;
+  const std::string* name;
+  bool* copies_globals;
+};
+
 class TaskFileReader {
  public:
   TaskFileReader(const Source& file, Configuration& configuration) : file_(file) {
@@ -57,6 +64,7 @@ class TaskFileReader {
             {&resource, &task.name, &task.extension, task.single.empty() ? task.interval_ns.value_or(0) : 0});
       }
       for (Program& program : resource.programs) {
+        programs_.push_back({&resource, &program.name, &program.copies_globals});
         if (program.task.empty()) tasks_.push_back({&resource, &program.name, &program.extension, 0});
       }
     }
@@ -90,14 +98,18 @@ class TaskFileReader {
 
   void read_root(const TomlTable& root) {
     for (const auto& [key, value] : root) {
-      if (key == "task") {
-        read_tasks(value, nullptr);
-      } else if (key == "resource") {
+      if (key == "resource") {
         read_resources(value);
-      } else {
-        refuse(key, value, "[task.NAME] and [resource.NAME.task.NAME]");
+      } else if (!read_part(key, value, nullptr)) {
+        refuse(key, value,
+               "[task.NAME], [program.NAME], [resource.NAME.task.NAME] and [resource.NAME.program.NAME]");
       }
     }
+  }
+  bool read_part(const std::string& key, const TomlValue& value, const Resource* resource) {
+    if (key == "task") read_tasks(value, resource);
+    if (key == "program") read_programs(value, resource);
+    return key == "task" || key == "program";
   }
   void refuse(const std::string& key, const TomlValue& value, std::string_view allowed) {
     problem(value, key == "scheduler"
@@ -112,12 +124,9 @@ class TaskFileReader {
       const Resource* const resource = find_resource(name, one);
       const TomlTable* const members = table(one, "resource.NAME.task.NAME");
       if (resource == nullptr || members == nullptr) continue;
-      for (const auto& [key, tasks] : *members) {
-        if (key == "task") {
-          read_tasks(tasks, resource);
-        } else {
-          refuse(key, tasks, "[resource.NAME.task.NAME]");
-        }
+      for (const auto& [key, part] : *members) {
+        if (!read_part(key, part, resource))
+          refuse(key, part, "[resource.NAME.task.NAME] and [resource.NAME.program.NAME]");
       }
     }
   }
@@ -137,7 +146,7 @@ class TaskFileReader {
     if (tasks == nullptr) return;
     for (const auto& [name, one] : *tasks) {
       if (problems_.size() >= kMostProblems) return;
-      const KnownTask* const task = find_task(name, one, resource);
+      const KnownTask* const task = find("task", tasks_, name, one, resource);
       const TomlTable* const keys = table(one, "task.NAME");
       if (task == nullptr || keys == nullptr) continue;
       if (task->extension->place.line != 0) {
@@ -149,23 +158,38 @@ class TaskFileReader {
       read_task(*task, *keys, one.line);
     }
   }
-  const KnownTask* find_task(const std::string& name, const TomlValue& value, const Resource* resource) {
-    const KnownTask* found = nullptr;
+  void read_programs(const TomlValue& value, const Resource* resource) {
+    const TomlTable* const programs = table(value, "program.NAME");
+    if (programs == nullptr) return;
+    for (const auto& [name, one] : *programs) {
+      if (problems_.size() >= kMostProblems) return;
+      const KnownProgram* const program = find("program", programs_, name, one, resource);
+      const TomlTable* const keys = table(one, "program.NAME");
+      if (program == nullptr || keys == nullptr) continue;
+      SectionReader reader(*keys, one.line, fmt::format("program {}", *program->name), problems_);
+      reader.tell_columns();
+      *program->copies_globals = read_choice(reader, "globals", kGlobals) == 1;
+      reader.refuse_unknown_keys();
+    }
+  }
+  template <class Known>
+  const Known* find(std::string_view kind, const std::vector<Known>& all, const std::string& name,
+                    const TomlValue& value, const Resource* resource) {
+    const Known* found = nullptr;
     std::vector<std::string_view> names;
-    for (const KnownTask& task : tasks_) {
-      if (resource != nullptr && task.resource != resource) continue;
-      names.push_back(*task.name);
-      if (folded(*task.name) != folded(name)) continue;
-      if (found != nullptr && found->resource != task.resource) {
-        problem(value, fmt::format("the resources {} and {} have a task {}; write [resource.{}.task.{}]",
-                                   found->resource->name, task.resource->name, *task.name,
-                                   found->resource->name, *task.name));
+    for (const Known& one : all) {
+      if (resource != nullptr && one.resource != resource) continue;
+      names.push_back(*one.name);
+      if (folded(*one.name) != folded(name)) continue;
+      if (found != nullptr && found->resource != one.resource) {
+        problem(value, fmt::format("the resources {0} and {1} have a {2} {3}; write [resource.{0}.{2}.{3}]",
+                                   found->resource->name, one.resource->name, kind, *one.name));
         return nullptr;
       }
-      found = &task;
+      found = &one;
     }
     if (found == nullptr) {
-      problem(value, fmt::format("there is no task '{}'; there are {}{}", shown(name), join_names(names),
+      problem(value, fmt::format("there is no {} '{}'; there are {}{}", kind, shown(name), join_names(names),
                                  suggestion(name, names)));
     }
     return found;
@@ -256,6 +280,7 @@ class TaskFileReader {
   const Source& file_;
   std::vector<const Resource*> resources_;
   std::vector<KnownTask> tasks_;
+  std::vector<KnownProgram> programs_;
   std::vector<ConfigProblem> problems_;
 };
 

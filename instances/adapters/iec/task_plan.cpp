@@ -340,8 +340,23 @@ class Planner {
     }
     for (const auto& [name, tasks] : users) {
       const Variable& variable = *plan_.globals.at(name);
-      if (!variable.constant && can_interleave(tasks)) name_shared(variable, tasks);
+      if (variable.constant || !can_interleave(tasks) || !changes_in_a_cycle(name, tasks)) continue;
+      name_shared(variable, tasks, "; globals = \"copy\" in [program.NAME] of the task file prevents that");
     }
+  }
+  // Of a task that another one can pre-empt, and of a program without a copy.
+  bool changes_in_a_cycle(const std::string& global, const Tasks& tasks) {
+    return std::ranges::any_of(tasks, [&](const PlannedTask* task) {
+      return std::ranges::any_of(tasks,
+                                 [&](const PlannedTask* other) { return can_pre_empt(*other, *task); }) &&
+             std::ranges::any_of(task->programs, [&](const Program* program) {
+               return !program->copies_globals && uses_.at(folded(program->type)).globals.contains(global);
+             });
+    });
+  }
+  static bool can_pre_empt(const PlannedTask& other, const PlannedTask& task) {
+    return &other != &task && (other.priority < task.priority ||
+                               std::min(other.priority, task.priority) > kLastRealTimePriority);
   }
   // Those of programs. An input of a program has a value for each task.
   void name_shared_places() {
@@ -355,11 +370,11 @@ class Planner {
       if (can_interleave(tasks)) name_shared(variable, tasks);
     }
   }
-  void name_shared(const Variable& variable, const Tasks& tasks) {
+  void name_shared(const Variable& variable, const Tasks& tasks, std::string_view advice = "") {
     plan_.remarks.push_back(
         {variable.place, fmt::format("the tasks {} use {} and can pre-empt each other: it may "
-                                     "change in the middle of a cycle",
-                                     names_of(tasks), variable.name)});
+                                     "change in the middle of a cycle{}",
+                                     names_of(tasks), variable.name, advice)});
   }
   void name_separate_globals() {
     if (!is_first_ || configuration_.resources.size() < 2) return;

@@ -29,7 +29,7 @@ std::uint64_t hash_of(std::string_view text, std::uint64_t seed = 0xcbf29ce48422
   return seed;
 }
 
-std::string first_word(const std::string& type) {
+std::string first_word(std::string_view type) {
   return folded(type.substr(0, type.find_first_of(" ([")));
 }
 
@@ -60,19 +60,14 @@ class Collector {
     const Pou* const type = project_.pou(program.type);
     if (type == nullptr) return;
     const std::size_t before = found_.all.size();
-    const std::string name = folded(program.name);
-    add_all(*type, {name + ".", instance(name) + ".", program.retain, 0});
+    add_all(*type, {folded(program.name) + ".", instance_in_c(resource_, program, compiler_) + ".",
+                    program.retain, 0});
     add_retained(before, task);
-  }
-
-  [[nodiscard]] std::string instance(const std::string& name) const {
-    if (compiler_ == Compiler::strucpp) return "g_config." + name;
-    return (resource_.name.empty() ? "RESOURCE" : folded(resource_.name)) + "__" + name;
   }
 
   void add_global(const std::string& name, const Variable& variable) {
     if (variable.constant || !variable.location.empty() || !is_kept(variable)) return;
-    if (compiler_ == Compiler::matiec && !is_data(first_word(variable.type))) return;  // a function block
+    if (compiler_ == Compiler::matiec && !is_data(project_, variable.type)) return;  // a function block
     const std::size_t before = found_.all.size();
     const Pou* const block = project_.pou(first_word(variable.type));
     if (block != nullptr) {
@@ -120,7 +115,7 @@ class Collector {
     const Pou* const block = project_.pou(type);
     if (block != nullptr)
       return add_all(*block, {path + ".", value + ".", retain && !is_timer, within.depth + 1});
-    const bool has_flags = compiler_ == Compiler::matiec && is_data(type);
+    const bool has_flags = compiler_ == Compiler::matiec && is_data(project_, type);
     found_.all.push_back(
         {path, value + (has_flags ? ".value" : ""), layout_of(variable.type), retain && !is_timer});
   }
@@ -143,15 +138,6 @@ class Collector {
     }
   }
 
-  [[nodiscard]] bool is_data(const std::string& type) const {
-    return std::ranges::find(kElementary, type) != kElementary.end() || type == "DATE_AND_TIME" ||
-           declared(type) != nullptr;
-  }
-  [[nodiscard]] const DeclaredType* declared(const std::string& type) const {
-    const auto found = std::ranges::find_if(
-        project_.types, [&](const DeclaredType& known) { return folded(known.name) == type; });
-    return found == project_.types.end() ? nullptr : &*found;
-  }
   // Of its words, and of those of the types that are named in it.
   [[nodiscard]] std::uint64_t layout_of(const std::string& type, std::size_t depth = 0) const {
     const std::string text = folded(type);
@@ -181,6 +167,19 @@ class Collector {
 };
 
 }  // namespace
+
+std::string instance_in_c(const Resource& resource, const Program& program, Compiler compiler) {
+  const std::string name = folded(program.name);
+  if (compiler == Compiler::strucpp) return "g_config." + name;
+  return (resource.name.empty() ? "RESOURCE" : folded(resource.name)) + "__" + name;
+}
+
+bool is_data(const Project& project, std::string_view type) {
+  const std::string name = first_word(type);
+  return std::ranges::find(kElementary, name) != kElementary.end() || name == "DATE_AND_TIME" ||
+         std::ranges::any_of(project.types,
+                             [&](const DeclaredType& known) { return folded(known.name) == name; });
+}
 
 ProgramVariables variables_of(const Project& project, const Resource& resource, const TaskPlan& plan,
                               Compiler compiler) {

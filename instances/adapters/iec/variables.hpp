@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "instances/adapters/iec/compiler.hpp"
@@ -25,6 +26,12 @@ struct ProgramVariables {
   std::vector<std::vector<std::size_t>> retained;
   SourceProblems remarks;
 };
+
+/// An instance of a program, in the output of the compiler: "RES__MAIN".
+[[nodiscard]] std::string instance_in_c(const Resource& resource, const Program& program, Compiler compiler);
+
+/// Whether its values are plain memory: no function block, and nothing that has references.
+[[nodiscard]] bool is_data(const Project& project, std::string_view type);
 
 /// Those of which a value of the last cycle means something in the next one: no temporary ones, no constants.
 [[nodiscard]] ProgramVariables variables_of(const Project& project, const Resource& resource,

@@ -85,6 +85,17 @@ class Writer : public iec::GlueWriter {
   [[nodiscard]] std::string global(const std::string& name) const override {
     return fmt::format("*__GET_GLOBAL_{}()", name);
   }
+  [[nodiscard]] CopyText copy(const iec::CopiedGlobal& global, std::size_t number) const override {
+    const std::string value = fmt::format("plchost_copy_{}", number);
+    std::string piece = value + (global.dimensions > 0 ? ".table" : "");
+    for (std::size_t i = 0; i < global.dimensions; ++i) piece += "[0]";
+    return {.storage = fmt::format("static __typeof__(*{}.value) {}, plchost_before_{};",
+                                   global.externals.front(), value, number),
+            .value = value,
+            .piece = std::move(piece),
+            .global = fmt::format("__GET_GLOBAL_{}()", global.name),
+            .external_end = ".value"};
+  }
 
   // Inputs of programs that several tasks use: no other task changes them in the middle of a cycle.
   std::set<Place> write_own_inputs(std::size_t number, const AddUse& add) override {
@@ -150,7 +161,9 @@ class Writer : public iec::GlueWriter {
     print(" use(&s);\n");
   }
   void write_binding() override {
-    print("void plchost_bind(void) {{\n  config_init__();\n{}}}\n", bindings_);
+    print("void plchost_bind(void) {{\n  config_init__();\n{}", bindings_);
+    write_copy_bindings();
+    print("}}\n");
   }
 
   const std::vector<Located>& located_;

@@ -98,8 +98,26 @@ class Writer : public iec::GlueWriter {
         symbol.bounds.size(), symbol.root, indexes, symbol.value, symbol.name, symbol.type, symbol.bytes,
         symbol.read_only ? 1 : 0, text(symbol.task), text(symbol.area), dimensions);
   }
-  // The constructors have done it.
-  void write_binding() override { print("void plchost_bind(void) {{}}\n"); }
+  [[nodiscard]] CopyText copy(const iec::CopiedGlobal& global, std::size_t number) const override {
+    const std::string value = fmt::format("plchost_copy_{}.value", number);
+    const std::string member = "strucpp::" + global.variable->member;  // X.value
+    return {.storage = fmt::format("static std::remove_pointer_t<decltype({1})> plchost_copy_{0};\n"
+                                   "static decltype(plchost_copy_{0}.value) plchost_before_{0};",
+                                   number, global.externals.front()),
+            .value = value,
+            .piece = fmt::format("(plchost_piece(plchost_before_{}))", number),
+            .locked = fmt::format("[](const plchost_copy* copy, void (*work)(const plchost_copy*)) {{ "
+                                  "{}.with_lock([&](auto*) {{ work(copy); }}); }}",
+                                  member.substr(0, member.rfind('.'))),
+            .global = "&" + member,
+            .external_end = ""};
+  }
+  // The constructors have done the rest.
+  void write_binding() override {
+    print("void plchost_bind(void) {{\n");
+    write_copy_bindings();
+    print("}}\n");
+  }
 
   std::span<const std::string> files_;
   std::span<const PlannedSymbol> symbols_;

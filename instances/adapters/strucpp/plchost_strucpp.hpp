@@ -43,6 +43,7 @@ class plchost_mutex {
 #define mutex plchost_mutex
 #include "iec_global.hpp"
 #undef mutex
+#include "iec_array.hpp"
 #include "iec_std_lib.hpp"
 
 // The library's clock is a variable of each thread, which takes memory at its first use. This one is that of
@@ -54,6 +55,16 @@ inline IEC_TIME plchost_time() {
 }
 }  // namespace strucpp
 #define TIME(...) plchost_time(__VA_ARGS__)
+
+// The part of a copy that is exchanged at a time: of an array an element. Not evaluated.
+template <class T>
+T& plchost_piece(T& value);
+template <class T, class Bounds>
+T& plchost_piece(strucpp::IEC_ARRAY_1D<T, Bounds>& array);
+template <class T, class First, class Second>
+T& plchost_piece(strucpp::IEC_ARRAY_2D<T, First, Second>& array);
+template <class T, class First, class Second, class Third>
+T& plchost_piece(strucpp::IEC_ARRAY_3D<T, First, Second, Third>& array);
 
 // An index outside of its array, or a reference to nothing: the library throws. The task gets an exception.
 template <class Program>

@@ -1,13 +1,8 @@
 // The adapter for translated programs, and, where MATIEC or STruC++ is, the whole way from
 // Structured Text.
-#include <array>
-#include <chrono>
 #include <csignal>
 #include <cstdint>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,9 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/adapters/run_program.hpp"
-#include "shm/files/pool_files.hpp"
-#include "shm/plc_process_image.h"
-#include "tests/integration/instances/instance_process.hpp"
+#include "tests/integration/instances/structured_text_fixture.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -121,103 +114,10 @@ CONFIGURATION cell
 END_CONFIGURATION
 )";
 
-struct Interrupted {
-  std::uint8_t bits = 0, unused[3]{};
-  std::int32_t lost = 0, slow = 0, fast = 0;
-};
-
 struct Counted {
   std::int32_t total = 0, fresh = 0;
   std::int16_t of_shift = 0;
   std::uint8_t held = 0, unused = 0;
-};
-
-struct ImageIn {
-  std::uint8_t bits = 0, unused = 0;
-  std::int16_t raw = 0;
-};
-struct ImageOut {
-  std::uint8_t bits = 0, unused = 0;
-  std::int16_t twice = 0;
-  std::uint8_t edges = 0, copied = 0, loops = 0, preset = 0, posts = 0;
-};
-
-class StructuredText : public ::testing::Test {
- protected:
-  ~StructuredText() override {
-    plc_image_close(&inputs_);
-    plc_image_close(&outputs_);
-    sut.reset();
-    remove_pool_memories(sandbox.pool());
-  }
-
-  void start(const std::string& application, const std::string& kind = "first") {
-    plc_image_close(&inputs_);
-    plc_image_close(&outputs_);
-    sut.reset();
-    const std::string settings =
-        sandbox.write("line1.cfg",
-                      "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=in\nLinux.Area.0.Size=64\n"
-                      "Linux.Area.1.Flags=0x8\nLinux.Area.1.Object=out\nLinux.Area.1.Size=64\n");
-    sut.emplace(sandbox, std::vector<std::string>{"--settings", settings, "--application", application,
-                                                  "--state-directory", sandbox.folder() + "/state",
-                                                  "--start-kind", kind});
-    sut->wait_until_up();
-    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", 64, PLC_IMAGE_WRITE, &inputs_), 0);
-    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", 64, PLC_IMAGE_READ, &outputs_), 0);
-  }
-  void put(ImageIn inputs) {
-    std::array<char, 64> bytes{};
-    std::memcpy(bytes.data(), &inputs, sizeof inputs);
-    plc_image_write(&inputs_, bytes.data());
-  }
-  template <class Image = ImageOut>
-  Image outputs() {
-    std::array<char, 64> bytes{};
-    EXPECT_EQ(plc_image_read(&outputs_, bytes.data(), nullptr), PLC_IMAGE_OK);
-    Image outputs;
-    std::memcpy(&outputs, bytes.data(), sizeof outputs);
-    return outputs;
-  }
-  /// The program of this file, in whichever way it was made.
-  void expect_it_works() {
-    EXPECT_TRUE(eventually([&] { return outputs().preset == 9; })) << "initial values are put out";
-    put({.raw = 21});
-    EXPECT_TRUE(eventually([&] { return outputs().twice == 42; }));
-    EXPECT_EQ(outputs().edges, 0);
-    put({.bits = 1, .raw = -3});
-    EXPECT_TRUE(eventually([&] {
-      return outputs().twice == -6 && outputs().bits == 2 && outputs().copied == 2;
-    })) << "the bit and the byte around it are one memory";
-    EXPECT_TRUE(eventually([&] { return outputs().edges == 1; })) << "SINGLE";
-    EXPECT_TRUE(eventually([&] { return outputs().loops == 1; })) << "a program without a task, by way of %M";
-    put({.bits = 0, .raw = 0});
-    EXPECT_TRUE(eventually([&] { return outputs().bits == 0 && outputs().loops == 0; }));
-    put({.bits = 1, .raw = 0});
-    EXPECT_TRUE(eventually([&] { return outputs().edges == 2; }));
-    const auto fast = sut->task("fast");
-    ASSERT_TRUE(fast);
-    EXPECT_GT(fast->counters.cycles, 0U);
-  }
-  static bool has(const char* folder_of_compiler) {
-    const char* const folder = std::getenv(folder_of_compiler);  // NOLINT(concurrency-mt-unsafe)
-    return folder != nullptr && *folder != '\0';
-  }
-  ProgramEnd build(const std::string& text, const std::string& name = "twice",
-                   const std::string& compiler = "matiec") const {
-    return run_program({PLCCTL, "build", "application", sandbox.write(name + ".st", text), "-o", so(name),
-                        "--compiler", compiler},
-                       sandbox.folder())
-        .value();
-  }
-  std::string so(const std::string& name) const { return sandbox.folder() + "/" + name + ".so"; }
-
-  Sandbox sandbox;
-  std::optional<InstanceProcess> sut;
-
- private:
-  plc_image inputs_{};
-  plc_image outputs_{};
 };
 
 class TranslatedByMatiec : public StructuredText {
@@ -231,18 +131,6 @@ class TranslatedByStrucpp : public StructuredText {
  protected:
   void SetUp() override {
     if (!has("PLCHOST_STRUCPP")) GTEST_SKIP() << "needs STruC++ (PLCHOST_STRUCPP)";
-  }
-};
-
-/// By each of them.
-class TranslatedText : public StructuredText, public ::testing::WithParamInterface<std::string> {
- protected:
-  void SetUp() override {
-    const bool is_matiec = GetParam() == "matiec";
-    if (!has(is_matiec ? "PLCHOST_MATIEC" : "PLCHOST_STRUCPP")) GTEST_SKIP() << "needs " << GetParam();
-  }
-  ProgramEnd build(const std::string& text, const std::string& name = "twice") const {
-    return StructuredText::build(text, name, GetParam());
   }
 };
 
@@ -309,6 +197,12 @@ TEST_P(TranslatedText, ThatIsInterruptedLosesNothingThatItWrote) {
   EXPECT_GT(outputs<Interrupted>().fast, 300);
 }
 
+TEST_P(TranslatedText, WithPersistentIsRefusedAtTheWord) {
+  std::string text = kCounting;
+  text.replace(text.find("VAR RETAIN"), 10, "VAR PERSISTENT");
+  EXPECT_THAT(build(text, "kept").output, HasSubstr("kept.st:3:7: PERSISTENT: "));
+}
+
 TEST_P(TranslatedText, ThatIsChangedOnlineGoesOnWithItsValues) {
   ASSERT_TRUE(build(kCounting, "counting").success());
   std::string text = kCounting;
@@ -336,37 +230,6 @@ TEST_P(TranslatedText, ThatIsChangedOnlineGoesOnWithItsValues) {
   const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
   EXPECT_EQ(refused.code, ErrorCode::refused);
   EXPECT_THAT(refused.text, HasSubstr("variables 'ONE.FRESH': qwLayout is"));
-}
-
-TEST_P(TranslatedText, HasTheTasksOfAFileBesideIt) {
-  constexpr const char* kCounts = R"(
-PROGRAM Posted VAR posts AT %QB8 : USINT; END_VAR posts := posts + 1; END_PROGRAM
-PROGRAM Cyclic VAR twice AT %QW1 : INT; END_VAR twice := 7; END_PROGRAM
-CONFIGURATION cell RESOURCE press ON PLC
-  TASK done (PRIORITY := 2);
-  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
-  PROGRAM one WITH done : Posted;
-  PROGRAM two WITH fast : Cyclic;
-END_RESOURCE END_CONFIGURATION
-)";
-  EXPECT_THAT(build(kCounts).output, HasSubstr("TASK done has neither INTERVAL nor SINGLE"));
-  const std::string file = sandbox.write("twice.toml",
-                                         "[task.Done]\nexternal_event = 'product'\nwatchdog_time = '1s'\n"
-                                         "[task.fast]\nstart_offset = '250us'\n");
-  const ProgramEnd built = build(kCounts);
-  ASSERT_TRUE(built.success()) << built.output;
-  EXPECT_THAT(built.output, HasSubstr("twice.toml: note: is read as the task file of "));
-  start(sandbox.folder() + "/twice.so");
-  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; }));
-  EXPECT_EQ(outputs().posts, 0);
-  PoolEvent product = sut->event("product");
-  EXPECT_EQ(product.post(), PostResult::posted);
-  EXPECT_TRUE(eventually([&] { return outputs().posts == 1; }));
-  EXPECT_EQ(product.post(), PostResult::posted);
-  EXPECT_TRUE(eventually([&] { return outputs().posts == 2; }));
-  (void)sandbox.write("twice.toml", "[task.done]\nexternal_event = 'product'\nlate_policy = 'asap'\n");
-  EXPECT_THAT(build(kCounts).output,
-              HasSubstr("twice.toml:3:1: task done late_policy: this task is not cyclic"));
 }
 
 TEST_F(TranslatedByMatiec, ThatIsNamedAsAHeaderOfCIsBuilt) {
@@ -445,11 +308,11 @@ TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
 }
 
 TEST_F(StructuredText, WhereNoCompilerIsFoundSaysHowToGetEach) {
-  const ProgramEnd built = run_program({"/usr/bin/env", "-u", "PLCHOST_MATIEC", "-u", "PLCHOST_STRUCPP", "PATH=/",
-                                        PLCCTL, "build", "application", sandbox.write("twice.st", kTwice),
-                                        "-o", so("twice")},
-                                       sandbox.folder())
-                               .value();
+  const ProgramEnd built =
+      run_program({"/usr/bin/env", "-u", "PLCHOST_MATIEC", "-u", "PLCHOST_STRUCPP", "PATH=/", PLCCTL, "build",
+                   "application", sandbox.write("twice.st", kTwice), "-o", so("twice")},
+                  sandbox.folder())
+          .value();
   EXPECT_EQ(built.exit_code, 1);
   EXPECT_THAT(built.output, HasSubstr("there is no compiler for Structured Text"));
   EXPECT_THAT(built.output, HasSubstr("name its folder by --matiec or PLCHOST_MATIEC"));

@@ -159,7 +159,8 @@ TEST_F(MatiecGlue, NamesTheGlobalsThatMayChangeInTheMiddleOfACycle) {
   const std::string both = std::string(kFast) + "PROGRAM one WITH fast : Main; PROGRAM two WITH slow : Main;";
   EXPECT_THAT(texts(write(kMain, kGo, "TASK slow (INTERVAL := T#1s, PRIORITY := 5);" + both).remarks),
               ElementsAre("c.st:2:12: the tasks slow, fast use go and can pre-empt each other: it may change "
-                          "in the middle of a cycle"));
+                          "in the middle of a cycle; globals = \"copy\" in [program.NAME] of the task file "
+                          "prevents that"));
   EXPECT_THAT(texts(write(kMain, kGo, "TASK slow (INTERVAL := T#1s, PRIORITY := 1);" + both).remarks),
               IsEmpty());
   EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL CONSTANT go : BOOL; END_VAR",
@@ -316,6 +317,39 @@ TEST_F(MatiecGlue, LeavesTheOtherResourcesToTheirApplications) {
   EXPECT_THAT(glue.text, HasSubstr("void PRESS_init__(void) {}"));
   EXPECT_THAT(glue.text, HasSubstr("&ROBOT__Q"));
   EXPECT_THAT(glue.text, Not(HasSubstr("PRESS__P")));
+}
+
+TEST_F(MatiecGlue, GivesAProgramCopiesOfItsGlobals) {
+  constexpr const char* kPrograms =
+      "TYPE Row : ARRAY[0..3, 1..2] OF INT; END_TYPE "
+      "FUNCTION_BLOCK Inner VAR_EXTERNAL go : BOOL; END_VAR END_FUNCTION_BLOCK "
+      "PROGRAM Main VAR_EXTERNAL go : BOOL; rows : Row; most : INT; late : TON; END_VAR "
+      "VAR part : Inner; END_VAR END_PROGRAM";
+  constexpr const char* kGlobals =
+      "VAR_GLOBAL go : BOOL; rows : Row; late : TON; END_VAR VAR_GLOBAL CONSTANT most : INT := 3; END_VAR";
+  const std::string tasks = std::string(kFast) +
+                            "TASK slow (INTERVAL := T#1s, PRIORITY := 5);"
+                            "PROGRAM one WITH fast : Main; PROGRAM two WITH slow : Main;";
+  const Glue glue = write(kPrograms, kGlobals, tasks, {}, "[program.two]\nglobals = 'copy'");
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(glue.text,
+              HasSubstr("static __typeof__(*PRESS__TWO.GO.value) plchost_copy_0, plchost_before_0;"));
+  EXPECT_THAT(glue.text, HasSubstr("{0, &plchost_copy_0, &plchost_before_0, sizeof plchost_copy_0, sizeof "
+                                   "plchost_copy_0, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("sizeof plchost_copy_1, sizeof plchost_copy_1.table[0][0], 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("  plchost_copies[0].global = __GET_GLOBAL_GO();\n"
+                                   "  PRESS__TWO.GO.value = &plchost_copy_0;\n"
+                                   "  PRESS__TWO.PART.GO.value = &plchost_copy_0;\n"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_begin(1);\n  plchost_take_copies(&plchost_copies[0], 2);\n"
+                                   "  MAIN_body__(&PRESS__TWO);\n"
+                                   "  plchost_put_copies(&plchost_copies[0], 2);\n  plchost_end(1);"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_begin(0);\n  MAIN_body__(&PRESS__ONE);\n  plchost_end(0);"));
+  EXPECT_THAT(texts(glue.remarks),
+              Contains(HasSubstr("PROGRAM two has no copy of late: it is a function block")));
+  EXPECT_THAT(texts(glue.remarks), Not(Contains(HasSubstr("use go and can pre-empt"))))
+      << "nothing pre-empts the task fast, and two has a copy";
+  const Glue other = write(kPrograms, kGlobals, tasks, {}, "[program.one]\nglobals = 'copy'");
+  EXPECT_THAT(texts(other.remarks), Contains(HasSubstr("use go and can pre-empt")));
 }
 
 }  // namespace

@@ -338,5 +338,24 @@ TEST(StrucppCompiler, SaysHowToGetOne) {
   EXPECT_THAT(none.error().message, HasSubstr("npm ci --ignore-scripts && npm run build"));
 }
 
+TEST(StrucppGlue, GivesAProgramCopiesOfItsGlobals) {
+  Parts parts;
+  parts.main += "," + variable("SPEED", "INT", "section=external;member=SPEED_");
+  const iec::Glue glue = glue_of(parts, "[program.one]\nglobals = 'copy'\n");
+  EXPECT_THAT(glue.text,
+              HasSubstr("static std::remove_pointer_t<decltype(g_config.ONE.SPEED_)> plchost_copy_0;"));
+  EXPECT_THAT(glue.text,
+              HasSubstr("{0, &plchost_copy_0.value, &plchost_before_0, sizeof plchost_copy_0.value, "
+                        "sizeof (plchost_piece(plchost_before_0)), "));
+  EXPECT_THAT(glue.text, HasSubstr("strucpp::SPEED.with_lock("));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_copies[0].global = &strucpp::SPEED.value;\n"
+                                   "  g_config.ONE.SPEED_ = &plchost_copy_0;\n"));
+  EXPECT_THAT(glue.text,
+              HasSubstr("plchost_take_copies(&plchost_copies[0], 1);\n  plchost_run(g_config.ONE);"));
+  EXPECT_THAT(texts(glue.remarks),
+              Contains(HasSubstr("PROGRAM one has no copy of GO: a part of the program uses "
+                                 "it without VAR_EXTERNAL")));
+}
+
 }  // namespace
 }  // namespace plchost::strucpp

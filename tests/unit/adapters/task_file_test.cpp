@@ -38,6 +38,13 @@ CONFIGURATION cell
 END_CONFIGURATION
 )";
 
+constexpr const char* kProgramsOfTwoResources = R"(
+CONFIGURATION cell
+  RESOURCE press ON PLC PROGRAM one : Main; END_RESOURCE
+  RESOURCE robot ON PLC PROGRAM one : Main; END_RESOURCE
+END_CONFIGURATION
+)";
+
 class TaskFile : public testing::Test {
  protected:
   std::vector<std::string> problems(const std::string& text, const char* program = kOneResource) {
@@ -135,9 +142,10 @@ TEST_F(TaskFile, RefusesKeysThatItDoesNotKnow) {
       ElementsAre(HasSubstr("a.toml:2:3: task fast unknown key 'watchdog'; allowed are external_event, "
                             "late_policy, start_offset, drives_outputs, watchdog_time, ")));
   EXPECT_THAT(problems("[tasks.fast]\n[resource.press]\nx = 1"),
-              ElementsAre("a.toml:1:2: 'tasks' is not expected here; allowed are [task.NAME] and "
-                          "[resource.NAME.task.NAME]",
-                          "a.toml:3:1: 'x' is not expected here; allowed are [resource.NAME.task.NAME]"));
+              ElementsAre("a.toml:1:2: 'tasks' is not expected here; allowed are [task.NAME], "
+                          "[program.NAME], [resource.NAME.task.NAME] and [resource.NAME.program.NAME]",
+                          "a.toml:3:1: 'x' is not expected here; allowed are [resource.NAME.task.NAME] and "
+                          "[resource.NAME.program.NAME]"));
   for (const char* const text :
        {"scheduler = 'x'", "[task.fast]\nscheduler = 'x'", "[resource.press]\nscheduler = 'x'"}) {
     EXPECT_THAT(problems(text), ElementsAre(HasSubstr("scheduler: the scheduler belongs to the instance")));
@@ -205,6 +213,28 @@ TEST_F(TaskFile, TellsABoundedNumberOfProblems) {
   std::string text;
   for (int i = 0; i < 1000; ++i) text += "[task.x" + std::to_string(i) + "]\n";
   EXPECT_EQ(problems(text).size(), 100U);
+}
+
+TEST_F(TaskFile, GivesAProgramCopiesOfItsGlobals) {
+  EXPECT_THAT(problems("[program.ONE]\nglobals = 'copy'\n[program.rest]\nglobals = 'shared'"), IsEmpty());
+  const std::vector<Program>& programs = configuration.resources.at(0).programs;
+  EXPECT_TRUE(programs.at(0).copies_globals);
+  EXPECT_FALSE(programs.at(1).copies_globals);
+  EXPECT_THAT(problems("[resource.robot.program.one]\nglobals = 'copy'", kProgramsOfTwoResources), IsEmpty());
+  EXPECT_FALSE(configuration.resources.at(0).programs.at(0).copies_globals);
+  EXPECT_TRUE(configuration.resources.at(1).programs.at(0).copies_globals);
+}
+
+TEST_F(TaskFile, RefusesWhatIsNoOptionOfAProgram) {
+  EXPECT_THAT(problems("[program.on]\nglobals = 'copy'"),
+              ElementsAre("a.toml:1:2: there is no program 'on'; there are one, rest; did you mean 'one'?"));
+  EXPECT_THAT(problems("[program.one]\nglobals = 'own'\nglobal = 'copy'"),
+              ElementsAre(HasSubstr("a.toml:2:"), HasSubstr("program one global: ")));
+  EXPECT_THAT(problems("[program]\none = 'copy'"),
+              ElementsAre(HasSubstr("is no table; write [program.NAME]")));
+  EXPECT_THAT(problems("[program.one]\nglobals = 'copy'", kProgramsOfTwoResources),
+              ElementsAre(HasSubstr("the resources press and robot have a program one; write "
+                                    "[resource.press.program.one]")));
 }
 
 }  // namespace

@@ -1,0 +1,146 @@
+// Tasks and globals of a program in Structured Text that have more than IEC 61131-3 has words for: the task
+// file, from its text to the instance that runs.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/integration/instances/structured_text_fixture.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class TextWithATaskFile : public TranslatedText {};
+
+INSTANTIATE_TEST_SUITE_P(By, TextWithATaskFile, ::testing::Values("matiec", "strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
+
+// A long task that sees globals of a short one, in several places.
+constexpr const char* kCopied = R"(
+FUNCTION_BLOCK Part
+  VAR_EXTERNAL a : DINT; rows : ARRAY[0..3] OF DINT; END_VAR
+  VAR_OUTPUT seen : DINT; END_VAR
+  seen := a;
+  rows[1] := rows[1] + 1;
+END_FUNCTION_BLOCK
+PROGRAM Slow
+  VAR_EXTERNAL a : DINT; b : DINT; done : DINT; rows : ARRAY[0..3] OF DINT; END_VAR
+  VAR here : Part; first : DINT; i : DINT; work : DINT; END_VAR
+  VAR changed AT %QD1 : DINT; cycles AT %QD2 : DINT; END_VAR
+  first := a;
+  IF a <> b THEN changed := changed + 1; END_IF;
+  FOR i := 0 TO 500000 DO work := work + i; END_FOR;
+  here();
+  IF a <> first OR b <> first OR here.seen <> first THEN changed := changed + 1; END_IF;
+  cycles := cycles + 1;
+  done := cycles;
+END_PROGRAM
+PROGRAM Fast
+  VAR_EXTERNAL a : DINT; b : DINT; done : DINT; rows : ARRAY[0..3] OF DINT; END_VAR
+  VAR all AT %QX0.0 : BOOL; cycles AT %QD3 : DINT; END_VAR
+  a := a + 1;
+  rows[2] := rows[2] + 1;
+  b := a;
+  cycles := cycles + 1;
+  all := done > 100 AND rows[1] > 100 AND rows[2] = cycles AND rows[1] >= done;
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL a : DINT; b : DINT; done : DINT; rows : ARRAY[0..3] OF DINT; END_VAR
+  RESOURCE press ON PLC
+    TASK quick (INTERVAL := T#1ms, PRIORITY := 1);
+    TASK idle (INTERVAL := T#5ms, PRIORITY := 5);
+    PROGRAM one WITH quick : Fast;
+    PROGRAM two WITH idle : Slow;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(TextWithATaskFile, SeesGlobalsOfOneMomentIfItHasCopies) {
+  const ProgramEnd shared = build(kCopied, "copied");
+  ASSERT_TRUE(shared.success()) << shared.output;
+  EXPECT_THAT(shared.output, HasSubstr("the tasks quick, idle use a and can pre-empt each other"));
+  start(so("copied"));
+  EXPECT_TRUE(eventually([&] { return outputs<Interrupted>().lost > 0; })) << "without copies a changes";
+  sut.reset();
+  (void)sandbox.write("copied.toml", "[program.one]\nglobals = 'copy'\n[program.two]\nglobals = 'copy'\n");
+  const ProgramEnd copied = build(kCopied, "copied");
+  ASSERT_TRUE(copied.success()) << copied.output;
+  EXPECT_THAT(copied.output, Not(HasSubstr("can pre-empt each other")));
+  start(so("copied"));
+  EXPECT_TRUE(eventually([&] { return outputs<Interrupted>().slow > 300; }));
+  EXPECT_EQ(outputs<Interrupted>().lost, 0);
+  EXPECT_TRUE(eventually([&] { return (outputs<Interrupted>().bits & 1) != 0; }))
+      << "all changes of each reach the other one, also elements of one array";
+}
+
+TEST_P(TextWithATaskFile, HasTheTasksOfAFileBesideIt) {
+  constexpr const char* kCounts = R"(
+PROGRAM Posted VAR posts AT %QB8 : USINT; END_VAR posts := posts + 1; END_PROGRAM
+PROGRAM Cyclic VAR twice AT %QW1 : INT; END_VAR twice := 7; END_PROGRAM
+CONFIGURATION cell RESOURCE press ON PLC
+  TASK done (PRIORITY := 2);
+  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+  PROGRAM one WITH done : Posted;
+  PROGRAM two WITH fast : Cyclic;
+END_RESOURCE END_CONFIGURATION
+)";
+  EXPECT_THAT(build(kCounts).output, HasSubstr("TASK done has neither INTERVAL nor SINGLE"));
+  const std::string file = sandbox.write("twice.toml",
+                                         "[task.Done]\nexternal_event = 'product'\nwatchdog_time = '1s'\n"
+                                         "[task.fast]\nstart_offset = '250us'\n");
+  const ProgramEnd built = build(kCounts);
+  ASSERT_TRUE(built.success()) << built.output;
+  EXPECT_THAT(built.output, HasSubstr("twice.toml: note: is read as the task file of "));
+  start(sandbox.folder() + "/twice.so");
+  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; }));
+  EXPECT_EQ(outputs().posts, 0);
+  PoolEvent product = sut->event("product");
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return outputs().posts == 1; }));
+  EXPECT_EQ(product.post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return outputs().posts == 2; }));
+  (void)sandbox.write("twice.toml", "[task.done]\nexternal_event = 'product'\nlate_policy = 'asap'\n");
+  EXPECT_THAT(build(kCounts).output,
+              HasSubstr("twice.toml:3:1: task done late_policy: this task is not cyclic"));
+}
+
+// An online change compares the tasks that run with those of the new version, option by option.
+TEST_P(TextWithATaskFile, HasEachOptionOfItsTaskFile) {
+  constexpr const char* kTwoTasks = R"(
+PROGRAM Counted VAR twice AT %QW1 : INT; END_VAR twice := 7; END_PROGRAM
+CONFIGURATION cell RESOURCE press ON PLC
+  TASK done (INTERVAL := T#3ms, PRIORITY := 2);
+  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+  PROGRAM one WITH done : Counted;
+  PROGRAM two WITH fast : Counted;
+END_RESOURCE END_CONFIGURATION
+)";
+  ASSERT_TRUE(build(kTwoTasks).success());
+  start(so("twice"));
+  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; }));
+  (void)sandbox.write("other.toml",
+                      "[task.done]\nexternal_event = 'product'\n"
+                      "[task.fast]\nstart_offset = '250us'\nlate_policy = 'asap'\ndrives_outputs = true\n"
+                      "watchdog_time = '7ms'\nwatchdog_sensitivity = 3\nwatchdog_omitted_cycles = 4\n"
+                      "watchdog_policy = 'task'\n");
+  const ProgramEnd built = build(kTwoTasks, "other");
+  ASSERT_TRUE(built.success()) << built.output;
+  const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
+  EXPECT_EQ(refused.code, ErrorCode::refused);
+  for (const char* const option :
+       {"start offset", "LatePolicy=Asap", "DrivesOutputs", "watchdog's time", "watchdog's sensitivity",
+        "watchdog's omitted cycles", "watchdog's Policy=Task", "product"})
+    EXPECT_THAT(refused.text, HasSubstr(option));
+  start(so("other"), "cold");
+  EXPECT_TRUE(eventually([&] { return sut->task("fast")->counters.cycles > 100; }));
+  EXPECT_EQ(sut->task("done")->counters.cycles, 0U);
+  (void)sandbox.write("other.toml", "[task.fast]\nscheduler = 'CmpScheduleTimer'\n");
+  EXPECT_THAT(build(kTwoTasks, "other").output,
+              HasSubstr("other.toml:2:1: task fast scheduler: the scheduler belongs to the instance"));
+}
+
+}  // namespace
+}  // namespace plchost::testing
