@@ -40,6 +40,7 @@ struct Part {
 [[nodiscard]] Result<std::vector<Row>> measure_blocks(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_variables(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_start(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_structured_text(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_fleet(const Plan& plan);
 
 }  // namespace plchost::bench

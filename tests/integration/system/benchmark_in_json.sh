@@ -22,6 +22,19 @@ is "$(one start '.targets[0].unit')" '"ms"' || fail "$(one start .targets)"
 is "$(one start '[.conditions.steal_percent | length]')" '[2]' || fail "$(one start .conditions)"
 is "$(grep -c nan "$cell/bench.log" "$cell/figures.json" | cut -d: -f2 | xargs)" "0 0" || fail "it prints a figure that is none"
 
+echo "- a part that needs a compiler for Structured Text says so, or measures"
+text() { TMPDIR=$cell/tmp "$@" "$BIN/plchost-bench" --only structured_text --quick --rounds 1 >"$cell/text.json" 2>>"$cell/bench.log" || fail "no figures of Structured Text"; }
+text env -u PLCHOST_MATIEC -u PLCHOST_STRUCPP
+is "$(jq -c '[.[] | [.name, .p50_us, .note]]' "$cell/text.json")" \
+  '[["structured_text/matiec",null,"skipped: PLCHOST_MATIEC names no folder of a compiler"],["structured_text/strucpp",null,"skipped: PLCHOST_STRUCPP names no folder of a compiler"]]' ||
+  fail "$(cat "$cell/text.json")"
+if [ -n "${PLCHOST_MATIEC:-}" ]; then
+  text env -u PLCHOST_STRUCPP
+  is "$(jq -c '[.[] | select(.p50_us > 0 and .ratio_p50 > 0 and .samples > 100) | .name]' "$cell/text.json")" \
+    '["structured_text/matiec/CmpSchedule/1ms","structured_text/matiec/CmpScheduleOneShot/1ms","structured_text/matiec/CmpScheduleTimer/1ms"]' ||
+    fail "$(cat "$cell/text.json")"
+fi
+
 echo "- and tables of it"
 "$source/tests/bench/figures.py" "$cell/figures.json" >"$cell/figures.md" || fail "no tables"
 grep -qE '^\| `start/plc-instance` \| idle \| [0-9.,]+ \| - \| - \|' "$cell/figures.md" || fail "$(cat "$cell/figures.md")"
