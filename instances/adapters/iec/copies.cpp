@@ -14,11 +14,9 @@ namespace plchost::iec {
 
 namespace {
 
-constexpr std::size_t kMostNested = 32;
-
-class Collector {
+class CopyCollector {
  public:
-  Collector(const Project& project, const TaskPlan& plan, const Program& program, Compiler compiler)
+  CopyCollector(const Project& project, const TaskPlan& plan, const Program& program, Compiler compiler)
       : project_(project), plan_(plan), program_(program), compiler_(compiler) {}
 
   ProgramCopies collect(const std::string& instance) {
@@ -100,7 +98,7 @@ class Collector {
 ProgramCopies copies_of(const Project& project, const Resource& resource, const TaskPlan& plan,
                         const Program& program, Compiler compiler) {
   if (!program.copies_globals) return {};
-  return Collector(project, plan, program, compiler).collect(instance_in_c(resource, program, compiler));
+  return CopyCollector(project, plan, program, compiler).collect(instance_in_c(resource, program, compiler));
 }
 
 }  // namespace plchost::iec

@@ -14,6 +14,9 @@
 
 namespace plchost::iec {
 
+/// Types within types and function blocks within function blocks, in levels: what lies deeper is not looked at.
+inline constexpr std::size_t kMostNested = 32;
+
 // The declarations in the sources of a program, as far as tasks, areas and variables need them. The compiler
 // reads the sources, too, and finds what is wrong in the rest. Names are as they stand in the source; compare
 // them by folded().

@@ -14,7 +14,6 @@ namespace plchost::iec {
 
 namespace {
 
-constexpr std::size_t kMostNested = 32;
 /// The types of variables with references begin so.
 constexpr std::string_view kReference = "REFERENCE ";
 
@@ -33,9 +32,9 @@ std::string first_word(std::string_view type) {
   return folded(type.substr(0, type.find_first_of(" ([")));
 }
 
-class Collector {
+class VariableCollector {
  public:
-  Collector(const Project& project, const Resource& resource, const TaskPlan& plan, Compiler compiler)
+  VariableCollector(const Project& project, const Resource& resource, const TaskPlan& plan, Compiler compiler)
       : project_(project), resource_(resource), plan_(plan), compiler_(compiler) {}
 
   ProgramVariables collect() {
@@ -183,7 +182,7 @@ bool is_data(const Project& project, std::string_view type) {
 
 ProgramVariables variables_of(const Project& project, const Resource& resource, const TaskPlan& plan,
                               Compiler compiler) {
-  return Collector(project, resource, plan, compiler).collect();
+  return VariableCollector(project, resource, plan, compiler).collect();
 }
 
 }  // namespace plchost::iec

@@ -19,11 +19,11 @@ namespace plchost::matiec {
 namespace {
 
 using iec::folded;
+using iec::kMostNested;
 using iec::Place;
 using iec::PlannedTask;
 using iec::TaskPlan;
 
-constexpr std::size_t kMostNested = 32;
 constexpr std::size_t kMostDimensions = 3;  // PLC_MAX_DIMENSIONS
 
 /// The types of MATIEC that have one value, and how that lies in memory.
