@@ -30,8 +30,8 @@
  *
  *     if (plc_image_silence_ns(&outputs) > limit) ... its own safe state
  *
- * The file is a memory of the pool: an object like all others once anybody opens it by name there, or the
- * manager has looked, provided that its owner may write the pool.
+ * The file is a memory of the pool. It is an object like all others once anybody opens it by name there, or
+ * the manager has looked, provided that its owner may write the pool.
  *
  * If the file is removed, an instance's next start or the next plc_image_open makes it anew: see
  * plc_image_gone().

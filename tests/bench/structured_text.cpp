@@ -1,5 +1,5 @@
-// Start latency of a 1 ms task in Structured Text, in a plc-instance under each scheduler. It is the time from
-// the planned release to the first instruction of the task, as the instance counts it. plcctl builds the
+// Start latency of a 1 ms task in Structured Text, in a plc-instance under each scheduler. It is the time
+// from the planned release to the first instruction of the task, as the instance counts it. plcctl builds the
 // program by each compiler that is there. Beside it F, in alternation.
 
 #include <array>

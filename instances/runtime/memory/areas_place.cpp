@@ -88,7 +88,7 @@ Result<void> check_retain(const Areas::Environment& environment, const RetainIma
   return room ? room : failure_in("retain variables", std::move(room).error());
 }
 
-// The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
+// The settings are checked by their texts. But a file has many: symbolic and hard links, and that of a memory
 // of the pool, one of which holds the retain areas.
 Result<void> check_distinct(const Areas::Environment& environment, const AreaPlan& plan,
                             std::span<const DeclaredArea> areas) {

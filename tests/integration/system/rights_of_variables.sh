@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Who may read, write and force variables: engineers, until the host's configuration gives it to others. Each write and force is
-# in the audit log with its principal.
+# Reading, writing and forcing of variables: engineers may do it, until the host's configuration gives it to others. Each write
+# and force is in the audit log with its principal.
 . "$(dirname "$0")/common.sh"
 
 plant=$cell/plant
