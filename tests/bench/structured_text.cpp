@@ -33,7 +33,7 @@ PROGRAM Main
   VAR late : TON; i : INT; END_VAR
   late(IN := raw >= 0, PT := T#20ms);
   lamp := late.Q;
-  FOR i := 1 TO 10 DO total := total + i * raw; END_FOR;
+  FOR i := 1 TO 10 DO total := total + INT_TO_DINT(i * raw); END_FOR;
 END_PROGRAM
 CONFIGURATION bench
   RESOURCE text ON PLC

@@ -132,7 +132,7 @@ END_RESOURCE END_CONFIGURATION
   EXPECT_EQ(refused.code, ErrorCode::refused);
   for (const char* const option :
        {"start offset", "LatePolicy=Asap", "DrivesOutputs", "watchdog's time", "watchdog's sensitivity",
-        "watchdog's omitted cycles", "watchdog's Policy=Task", "product"})
+        "watchdog's omitted cycles", "watchdog's Policy=Task", "its kind is external"})
     EXPECT_THAT(refused.text, HasSubstr(option));
   start(so("other"), "cold");
   EXPECT_TRUE(eventually([&] { return sut->task("fast")->counters.cycles > 100; }));
