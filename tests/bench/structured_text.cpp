@@ -30,10 +30,10 @@ constexpr std::string_view kInstance = "text";
 constexpr std::string_view kProgram = R"(
 PROGRAM Main
   VAR raw AT %IW0 : INT; total AT %QD0 : DINT; lamp AT %QX4.0 : BOOL; END_VAR
-  VAR late : TON; i : INT; END_VAR
+  VAR late : TON; i : DINT; END_VAR
   late(IN := raw >= 0, PT := T#20ms);
   lamp := late.Q;
-  FOR i := 1 TO 10 DO total := total + INT_TO_DINT(i * raw); END_FOR;
+  FOR i := 1 TO 10 DO total := total + i * INT_TO_DINT(raw); END_FOR;
 END_PROGRAM
 CONFIGURATION bench
   RESOURCE text ON PLC
