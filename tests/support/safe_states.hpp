@@ -9,7 +9,7 @@ namespace plchost::testing {
 /// Words of the output area of the application `outputs`.
 using OutputWords = std::array<std::uint32_t, 4>;
 
-/// What its tasks put out, but for Valve.
+/// The values that its tasks put out; of Valve, which waits, none.
 inline constexpr OutputWords kDriven{0x11111111, 0x22222222, 0, 0x44444444};
 
 /// A SafeState of that area, and what a terminal is shown then.
