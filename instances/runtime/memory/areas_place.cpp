@@ -245,7 +245,8 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
   } else {
     block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
     if (planned.settings == nullptr) return block.outputs->write(block.initial);
-    block.outputs->begin(block.initial, safe_values(*planned.settings));
+    const AreaSettings& settings = *planned.settings;
+    block.outputs->begin(block.initial, safe_values(settings), settings.safe != SafeState::unsaid);
   }
 }
 

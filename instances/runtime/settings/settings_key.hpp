@@ -20,7 +20,7 @@ struct AreaDraft {
   std::string where;  ///< its first line
   std::optional<std::int64_t> flags, address, size;
   std::string device, object;
-  SafeState safe = SafeState::keep;
+  SafeState safe = SafeState::unsaid;
   std::vector<std::byte> safe_values;
 };
 

@@ -29,12 +29,13 @@ using Words = std::array<std::uint32_t, 3>;
 
 std::string area_with(const std::string& safe, const std::string& size = "12") {
   return "[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Object=io\nLinux.Area.0.Size=" + size +
-         "\nLinux.Area.0.SafeState=" + safe + "\n";
+         (safe.empty() ? "\n" : "\nLinux.Area.0.SafeState=" + safe + "\n");
 }
 
 TEST(SafeStateSetting, IsAWordInAnyCaseOrTheBytesInOrder) {
   EXPECT_EQ(parse_settings(area_with("Keep"), "l.cfg")->areas[0].safe, SafeState::keep);
   EXPECT_EQ(parse_settings(area_with("zERO"), "l.cfg")->areas[0].safe, SafeState::zero);
+  EXPECT_EQ(parse_settings(area_with(""), "l.cfg")->areas[0].safe, SafeState::unsaid);
   const auto given = parse_settings(area_with("0x01fFa0", "3"), "l.cfg");
   ASSERT_TRUE(given) << given.error().describe();
   EXPECT_EQ(given->areas[0].safe, SafeState::values);
@@ -195,6 +196,50 @@ TEST_F(SafeOutputsOfAreas, TellTheSilenceByTheState) {
   EXPECT_EQ(plc_image_silence_ns(&*terminal), 0) << "ended";
 }
 
+// Settings that name no safe state leave it to the terminals, each of which has a limit of its own.
+TEST_F(SafeOutputsOfAreas, AreToldByTheirAgeIfTheSettingsNameNone) {
+  set_up("");
+  sut.outputs().arm();
+  run(0, 10);
+  for (const unsigned state :
+       {PLC_IMAGE_STATE_STOPPED, PLC_IMAGE_STATE_EXCEPTION, PLC_IMAGE_STATE_HALTED, PLC_IMAGE_STATE_ENDED}) {
+    sut.outputs().put_safe(state);
+    sut.outputs().beat([](std::size_t) { return false; });
+    EXPECT_EQ(shown(), (Words{10, 5, 12})) << "as if they were kept";
+    const plc_image_i64 age_ns = plc_image_age_ns(&*terminal);
+    EXPECT_GT(age_ns, 0);
+    EXPECT_GE(plc_image_silence_ns(&*terminal), age_ns) << state;
+  }
+}
+
+TEST_F(SafeOutputsOfAreas, ThatAreKeptBySettingsAreNoSilence) {
+  set_up("Keep");
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  sut.outputs().beat([](std::size_t) { return false; });
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
+  sut.end_outputs(true);
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
+}
+
+// A terminal would go on with the last image that it could read.
+TEST_F(SafeOutputsOfAreas, ThatAStrangerHasSpoiledAreSilence) {
+  set_up("Zero");
+  sut.outputs().beat([](std::size_t) { return false; });
+  ASSERT_EQ(plc_image_silence_ns(&*terminal), 0);
+  const std::uint64_t safe = terminal->header->safe;
+  for (const std::uint64_t word : {std::uint64_t{0}, std::uint64_t{0x1ff}, safe + 0x100}) {
+    for (const bool ended : {false, true}) {
+      if (ended) plc_image_tell(&*terminal, PLC_IMAGE_STATE_ENDED, 1);
+      terminal->header->safe = word;
+      EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER) << word;
+      terminal->header->safe = safe;
+      EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
+    }
+  }
+}
+
 // Firmware that writes inputs tells nothing of itself, and shows what it writes.
 TEST_F(SafeOutputsOfAreas, AreNoneOfTheNextWriterThatTellsNoState) {
   set_up("Zero");
@@ -303,7 +348,7 @@ TEST_F(SafeOutputsOfAreas, OfAProcessThatLeftItsImageHalfWrittenAreTakenOver) {
   ASSERT_EQ(shown(), (Words{10, 5, 12}));
   OutputImage next(std::span(reinterpret_cast<std::byte*>(terminal->header), terminal->mapped), 12);
   const Words initial{7, 7, 7};
-  next.begin(std::as_bytes(std::span(initial)), {});
+  next.begin(std::as_bytes(std::span(initial)), {}, true);
   EXPECT_EQ(state(), PLC_IMAGE_STATE_STOPPED);
   EXPECT_EQ(shown(), (Words{10, 5, 12})) << "kept until its first cycle";
   next.arm();
