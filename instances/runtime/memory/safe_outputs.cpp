@@ -9,7 +9,7 @@ namespace plchost {
 
 void SafeOutputs::make(std::vector<Block> blocks, std::size_t tasks) {
   blocks_ = std::move(blocks);
-  process_ = ::getpid();
+  process_.store(::getpid(), std::memory_order_relaxed);
   rests_.assign(tasks, true);
   fails_.assign(tasks, false);
 }
@@ -23,14 +23,14 @@ void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
 
 void SafeOutputs::put_safe(unsigned state) noexcept {
   armed_ = false;
-  if (state == PLC_IMAGE_STATE_ENDED) process_ = 0;
+  if (state == PLC_IMAGE_STATE_ENDED) process_.store(0, std::memory_order_relaxed);
   if (state == PLC_IMAGE_STATE_EXCEPTION) failed_.store(true, std::memory_order_relaxed);
   for (Block& block : blocks_) put_safe(block, state);
 }
 
 void SafeOutputs::fail() noexcept {
   // Not for a process that the application has forked, nor after the end.
-  if (::getpid() != process_) return;
+  if (::getpid() != process_.load(std::memory_order_relaxed)) return;
   failed_.store(true, std::memory_order_relaxed);
   for (const Block& block : blocks_) {
     if (block.image != nullptr) {

@@ -76,7 +76,7 @@ class SafeOutputs {
   std::vector<bool> fails_;  // by task
   bool armed_ = false;       // or driven
   std::atomic<bool> failed_{false};
-  pid_t process_ = 0;
+  std::atomic<pid_t> process_{0};  // a signal handler asks; 0: the end was told
 };
 
 }  // namespace plchost
