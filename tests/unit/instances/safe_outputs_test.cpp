@@ -369,6 +369,18 @@ TEST_F(SafeOutputsOfAreas, AreRefusedInAnObjectOfOtherAreas) {
                                             HasSubstr("is no output")));
 }
 
+TEST_F(SafeOutputsOfAreas, AreRefusedInAnImageOfTheHeaderBefore) {
+  task("Main", [] {});
+  declare("out", PLC_AREA_OUTPUT, 12);
+  const std::size_t before = plc_image_bytes(12) - PLC_IMAGE_SAFE_SLOTS * plc_image_stride(12);
+  ASSERT_TRUE(shared_.create_memory("io", before, {.keep = true}, {}));
+  const auto placed = place(area_with("Zero"));
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message,
+              AllOf(HasSubstr("l.cfg:2: [SysMem] Area.0"), HasSubstr("plc_process_image.h before version 2"),
+                    HasSubstr("remove it")));
+}
+
 TEST_F(SafeOutputsOfAreas, TellTheAgesOfTheLastImageAndOfTheProcess) {
   set_up("Zero");
   EXPECT_LT(plc_image_age_ns(&*terminal), PLC_IMAGE_NEVER);
