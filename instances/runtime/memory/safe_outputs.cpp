@@ -14,8 +14,15 @@ void SafeOutputs::make(std::vector<Block> blocks, std::size_t tasks) {
   fails_.assign(tasks, false);
 }
 
+// Each of its tasks alone: nobody drives it any more.
+bool SafeOutputs::has_failed(const Block& block) const noexcept {
+  return !block.writers.empty() &&
+         std::ranges::all_of(block.writers, [&](const Writer& one) { return fails_[one.task]; });
+}
+
 void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
-  const bool failed = failed_.load(std::memory_order_relaxed) && state != PLC_IMAGE_STATE_ENDED;
+  const bool failed =
+      (failed_.load(std::memory_order_relaxed) || has_failed(block)) && state != PLC_IMAGE_STATE_ENDED;
   if (block.image != nullptr) return block.image->put_safe(failed ? PLC_IMAGE_STATE_EXCEPTION : state);
   block.registers->put_safe();
   block.unsettled = true;
@@ -76,7 +83,7 @@ void SafeOutputs::task_fails(std::size_t task) noexcept {
     const auto writer = std::ranges::find(block.writers, task, &Writer::task);
     if (writer == block.writers.end()) continue;
     writer->view->give_up();
-    if (block.writers.size() == 1) {
+    if (has_failed(block)) {
       put_safe(block, PLC_IMAGE_STATE_EXCEPTION);
     } else {
       settle(block, [](std::size_t) { return true; });

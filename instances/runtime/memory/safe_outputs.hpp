@@ -52,8 +52,9 @@ class SafeOutputs {
   /// Of an application of so many tasks. Set-up.
   void make(std::vector<Block> blocks, std::size_t tasks);
 
-  /// All outputs; `state` is one of PLC_IMAGE_STATE_..., for the dead-man word. After a fault it stays
-  /// PLC_IMAGE_STATE_EXCEPTION until the end. Control thread.
+  /// All outputs; `state` is one of PLC_IMAGE_STATE_..., for the dead-man word. After a fault, and after
+  /// those of all tasks that write the area, it stays PLC_IMAGE_STATE_EXCEPTION until the end. Control
+  /// thread.
   void put_safe(unsigned state) noexcept;
   /// A fault of the whole application: the part of put_safe() that a signal handler can do. Any context.
   void fail() noexcept;
@@ -69,6 +70,7 @@ class SafeOutputs {
 
  private:
   void put_safe(Block& block, unsigned state) noexcept;
+  [[nodiscard]] bool has_failed(const Block& block) const noexcept;
   void settle(Block& block, const InCycle& in_cycle) noexcept;
 
   std::vector<Block> blocks_;

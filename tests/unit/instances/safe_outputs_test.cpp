@@ -326,6 +326,22 @@ TEST_F(SafeOutputsOfAreas, AreThoseBytesThatATaskAloneWritesIfItFailsAlone) {
   EXPECT_EQ(shown(), (Words{40, 2, 42}));
 }
 
+TEST_F(SafeOutputsOfAreas, AreInExceptionWhenAllWhoWriteThemHaveFailedAlone) {
+  set_up("0x010000000200000003000000");
+  sut.outputs().arm();
+  run(0, 10);
+  run(1, 20);
+  sut.outputs().task_fails(1);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+  sut.outputs().task_fails(0);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(shown(), (Words{1, 2, 3})) << "also the word that both of them change";
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION) << "no start helps";
+  sut.end_outputs(true);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_ENDED);
+}
+
 TEST_F(SafeOutputsOfAreas, AreReachedWhenAllWhoWriteThemRest) {
   set_up("Zero");
   sut.outputs().arm();
