@@ -30,9 +30,6 @@
  *
  *     if (plc_image_silence_ns(&outputs) > limit) ... its own safe state
  *
- * It reaches that limit in each stop and after each end, too, if the settings of the instance name no
- * SafeState.
- *
  * The file is a memory of the pool. It is an object like all others once anybody opens it by name there, or
  * the manager has looked, provided that its owner may write the pool.
  *
@@ -265,16 +262,14 @@ static __inline__ plc_image_i64 plc_image_age_of(plc_image_i64 stamp_ns) {
   return stamp_ns <= 0 || stamp_ns > now ? PLC_IMAGE_NEVER : now - stamp_ns;
 }
 
-/* Since the image was published that `word` of the header names, in one of the first `slots`; or
- * PLC_IMAGE_NEVER. Real-time. */
-static __inline__ plc_image_i64 plc_image_age_by(const plc_image* image, const plc_image_u64* word,
-                                                 unsigned int slots) {
+/* Since the image that `word` of the header names was published; or PLC_IMAGE_NEVER. Real-time. */
+static __inline__ plc_image_i64 plc_image_age_by(const plc_image* image, const plc_image_u64* word) {
   int attempt;
   for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
     const plc_image_u64 named = __atomic_load_n(word, __ATOMIC_ACQUIRE);
     const plc_image_slot* slot;
     plc_image_i64 stamp_ns;
-    if (named == 0 || (named & 0xffu) >= slots) break;
+    if (named == 0 || (named & 0xffu) >= PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) break;
     slot = plc_image_slot_at(image, (unsigned int)(named & 0xffu));
     stamp_ns = __atomic_load_n(&slot->stamp_ns, __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_ACQUIRE);
@@ -285,7 +280,7 @@ static __inline__ plc_image_i64 plc_image_age_by(const plc_image* image, const p
 
 /* Since the latest image was published, whatever is shown; or PLC_IMAGE_NEVER. Real-time. */
 static __inline__ plc_image_i64 plc_image_age_ns(const plc_image* image) {
-  return plc_image_age_by(image, &image->header->latest, PLC_IMAGE_SLOTS);
+  return plc_image_age_by(image, &image->header->latest);
 }
 
 /* Since the last sign of the writer; or PLC_IMAGE_NEVER: it gives none. Real-time. */
@@ -293,29 +288,21 @@ static __inline__ plc_image_i64 plc_image_heartbeat_age_ns(const plc_image* imag
   return plc_image_age_of(__atomic_load_n(&image->header->heartbeat_ns, __ATOMIC_RELAXED));
 }
 
-/* Whether the image that is shown can be read: no stranger has spoiled it. */
-static __inline__ int plc_image_is_whole(const plc_image* image, plc_image_u64 control) {
-  const plc_image_header* const header = image->header;
-  const plc_image_u64* const shown = (control & PLC_IMAGE_SHOWS_SAFE) != 0 ? &header->safe : &header->latest;
-  return plc_image_age_by(image, shown, PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) != PLC_IMAGE_NEVER;
-}
-
 /* How long nobody has said which outputs hold; 0: the writer gives signs, or has told its end. While it runs
  * this is the age of the latest image, so the limit must be longer than the interval of the tasks. While its
  * tasks rest it is the time since the fifth sign that is missing. If its settings name no safe state, it is
- * always the age of the latest image. PLC_IMAGE_NEVER: nothing was written yet, or a stranger has spoiled it.
- * Real-time. */
+ * the age in each state. PLC_IMAGE_NEVER: nothing was written yet, or it is spoiled. Real-time. */
 static __inline__ plc_image_i64 plc_image_silence_ns(const plc_image* image) {
+  const plc_image_header* const header = image->header;
   const plc_image_u64 control = plc_image_control(image);
-  const unsigned int state = (unsigned int)(control & PLC_IMAGE_STATE);
-  plc_image_i64 age_ns = 0;
-  if (state < PLC_IMAGE_STATE_STOPPED || state > PLC_IMAGE_STATE_ENDED ||
-      __atomic_load_n(&image->header->holds, __ATOMIC_RELAXED) == 0)
-    return plc_image_age_ns(image);
-  if (!plc_image_is_whole(image, control)) return PLC_IMAGE_NEVER;
-  if (state != PLC_IMAGE_STATE_ENDED) age_ns = plc_image_heartbeat_age_ns(image);
-  if (age_ns == PLC_IMAGE_NEVER) return age_ns;
-  return age_ns > PLC_IMAGE_PATIENCE_NS ? age_ns - PLC_IMAGE_PATIENCE_NS : 0;
+  const plc_image_u64 state = control & PLC_IMAGE_STATE;
+  const int rests = state >= PLC_IMAGE_STATE_STOPPED && state <= PLC_IMAGE_STATE_ENDED;
+  const int safe = (control & PLC_IMAGE_SHOWS_SAFE) != 0;
+  const plc_image_i64 age_ns = plc_image_age_by(image, safe ? &header->safe : &header->latest);
+  const plc_image_i64 sign_ns = state == PLC_IMAGE_STATE_ENDED ? 0 : plc_image_heartbeat_age_ns(image);
+  if (!rests || __atomic_load_n(&header->holds, __ATOMIC_RELAXED) == 0) return plc_image_age_ns(image);
+  if (age_ns == PLC_IMAGE_NEVER || sign_ns == PLC_IMAGE_NEVER) return PLC_IMAGE_NEVER;
+  return sign_ns > PLC_IMAGE_PATIENCE_NS ? sign_ns - PLC_IMAGE_PATIENCE_NS : 0;
 }
 
 /* For the writer, beside plc_image_write: one process at a time. */
@@ -329,8 +316,7 @@ static __inline__ void plc_image_set_safe(const plc_image* image, const void* by
   __atomic_store_n(&image->header->safe, sequence << 8 | number, __ATOMIC_RELEASE);
 }
 
-/* 1: the outputs that are shown while no task drives them hold, because the settings name them. 0: readers go
- * by the age of the latest image. Set-up. */
+/* 0: nobody says that outputs hold while no task drives them, so readers go by the age. Set-up. */
 static __inline__ void plc_image_hold(const plc_image* image, int holds) {
   __atomic_store_n(&image->header->holds, holds ? 1u : 0u, __ATOMIC_RELAXED);
 }

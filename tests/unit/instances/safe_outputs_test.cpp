@@ -212,17 +212,6 @@ TEST_F(SafeOutputsOfAreas, AreToldByTheirAgeIfTheSettingsNameNone) {
   }
 }
 
-TEST_F(SafeOutputsOfAreas, ThatAreKeptBySettingsAreNoSilence) {
-  set_up("Keep");
-  sut.outputs().arm();
-  run(0, 10);
-  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
-  sut.outputs().beat([](std::size_t) { return false; });
-  EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
-  sut.end_outputs(true);
-  EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
-}
-
 // A terminal would go on with the last image that it could read.
 TEST_F(SafeOutputsOfAreas, ThatAStrangerHasSpoiledAreSilence) {
   set_up("Zero");
