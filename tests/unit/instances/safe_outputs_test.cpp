@@ -218,11 +218,11 @@ TEST_F(SafeOutputsOfAreas, ThatAStrangerHasSpoiledAreSilence) {
   sut.outputs().beat([](std::size_t) { return false; });
   ASSERT_EQ(plc_image_silence_ns(&*terminal), 0);
   const std::uint64_t safe = terminal->header->safe;
-  for (const std::uint64_t word : {std::uint64_t{0}, std::uint64_t{0x1ff}, safe + 0x100}) {
+  for (const std::uint64_t spoiled : {std::uint64_t{0}, std::uint64_t{0x1ff}, safe + 0x100}) {
     for (const bool ended : {false, true}) {
       if (ended) plc_image_tell(&*terminal, PLC_IMAGE_STATE_ENDED, 1);
-      terminal->header->safe = word;
-      EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER) << word;
+      terminal->header->safe = spoiled;
+      EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER) << spoiled;
       terminal->header->safe = safe;
       EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
     }
