@@ -13,6 +13,7 @@ namespace plchost::plcopen {
 namespace {
 
 using Kind = ExportedTask::Kind;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -51,7 +52,9 @@ iec::Project read_again(const std::string& xml) {
   EXPECT_THAT(problems, IsEmpty());
   sut.restore(problems, remarks);
   EXPECT_FALSE(remarks.empty());
-  for (const auto& remark : remarks) EXPECT_THAT(remark.text, HasSubstr("its body has no statement"));
+  for (const auto& remark : remarks)
+    EXPECT_THAT(remark.text,
+                AnyOf(HasSubstr("its body has no statement"), HasSubstr("ST cannot tell the two apart")));
   auto [project, wrong] = iec::read_project(sources);
   EXPECT_THAT(wrong, IsEmpty()) << sources.front().text;
   for (iec::Configuration& configuration : project.configurations) sut.add_events(configuration);
