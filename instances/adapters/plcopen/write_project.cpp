@@ -283,7 +283,7 @@ class Writer {
   }
   void add_edges(xml_node resource) const {
     if (edges_.empty()) return;
-    xml_node list = resource.append_child("globalVars");
+    const xml_node list = resource.append_child("globalVars");
     for (const std::string& name : edges_) add_type(add(list, "variable", name).append_child("type"), "BOOL");
     document(list, "plchost does not know the true ones");
   }

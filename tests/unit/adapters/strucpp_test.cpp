@@ -200,7 +200,8 @@ std::string symbol(const std::string& name, const std::string& type, const std::
 TEST(StrucppSymbols, TellTheirTasksPlacesAndNamesOfTheSource) {
   Parts parts;
   parts.main = variable("raw", "INT", "at=%IW1") + "," + variable("pump", "PUMP", "member=PUMP_") + "," +
-               variable("Pumps.1", "PUMP", "member=PUMPS[1]") + "," + variable("link", "REFERENCE INT");
+               variable("Pumps.1", "PUMP", "member=PUMPS[1]") + "," + variable("link", "REFERENCE INT") +
+               "," + variable("GO", "BOOL", "section=external;member=");
   parts.symbols = symbol("ONE.RAW", "INT", "g_config.ONE.RAW") + "," +
                   symbol("ONE.PUMP.HOURS", "DINT", "g_config.ONE.PUMP_.HOURS") + "," +
                   symbol("ONE.PUMPS[].HOURS", "DINT", "g_config.ONE.PUMPS[].HOURS", "[1,2]") + "," +

@@ -227,9 +227,9 @@ TEST_F(TaskFile, GivesAProgramCopiesOfItsGlobals) {
 
 TEST_F(TaskFile, RefusesWhatIsNoOptionOfAProgram) {
   EXPECT_THAT(problems("[program.on]\nglobals = 'copy'"),
-              ElementsAre("a.toml:1:2: there is no program 'on'; there are one, rest; did you mean 'one'?"));
+              ElementsAre("a.toml:1:10: there is no program 'on'; there are one, rest; did you mean 'one'?"));
   EXPECT_THAT(problems("[program.one]\nglobals = 'own'\nglobal = 'copy'"),
-              ElementsAre(HasSubstr("a.toml:2:"), HasSubstr("program one global: ")));
+              ElementsAre(HasSubstr("a.toml:2:"), HasSubstr("program one unknown key 'global'")));
   EXPECT_THAT(problems("[program]\none = 'copy'"),
               ElementsAre(HasSubstr("is no table; write [program.NAME]")));
   EXPECT_THAT(problems("[program.one]\nglobals = 'copy'", kProgramsOfTwoResources),
