@@ -66,7 +66,7 @@ else
 fi
 if [ "${compilers[0]:-}" = matiec ]; then
   echo "- programs and located variables of Structured Text"
-  file_has 'names(".//resource[@name=\"line3\"]//pouInstance")' "counting_program halting_program conveyor1"
+  file_has 'names(".//resource[@name=\"line3\"]//pouInstance")' "halting_program counting_program conveyor1"
   file_has 'root.find(".//pou[@name=\"conveyor1_type\"]//variable[@name=\"motor\"]").get("address")' "%QX0.0"
   file_has 'names(".//dataType[@name=\"pulse_type\"]//variable")' "ET IN PT Q"
 fi
