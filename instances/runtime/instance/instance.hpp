@@ -136,7 +136,7 @@ class Instance {
   /// All tasks that halt go on, and none halts until resume_debugging().
   void let_tasks_go(std::string_view why);
   void resume_debugging();
-  /// "2 halted tasks were let go first; ", or nothing. Once.
+  /// "2 halted tasks were let go first", or nothing. Once.
   [[nodiscard]] std::string take_let_go();
 
   // Variables that are seen from outside: instance_variables.cpp

@@ -70,8 +70,9 @@ std::string Instance::finish_change(Duration held) {
   const double us = std::chrono::duration<double, std::micro>(held).count();
   life_.stay(fmt::format("online change to {}", application_->path()));
   resume_debugging();
-  std::string text =
-      take_let_go() + fmt::format("taken over between two cycles, within {:.0f} us: {}", us, carried);
+  std::string text = take_let_go();
+  if (!text.empty()) text += "; ";
+  text += fmt::format("taken over between two cycles, within {:.0f} us: {}", us, carried);
   spdlog::info("online change from {} to {}: {}", before, application_->path(), text);
   return text;
 }

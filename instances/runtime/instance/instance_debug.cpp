@@ -68,7 +68,7 @@ void Instance::resume_debugging() {
 
 std::string Instance::take_let_go() {
   const std::size_t count = std::exchange(let_go_, 0);
-  return count == 0 ? std::string() : fmt::format("{} halted tasks were let go first; ", count);
+  return count == 0 ? std::string() : fmt::format("{} halted tasks were let go first", count);
 }
 
 }  // namespace plchost
