@@ -25,13 +25,13 @@ FUNCTION_BLOCK Counter
 END_FUNCTION_BLOCK
 
 PROGRAM Press
-  VAR left : Counter; right : Counter; total : INT; END_VAR
-  left(up := TRUE);
-  right(up := left.n > 5);
+  VAR one : Counter; two : Counter; total : INT; END_VAR
+  one(up := TRUE);
+  two(up := one.n > 5);
   IF total > 1000 THEN
     total := 0;
   ELSE
-    total := Twice(right.n);
+    total := Twice(two.n);
   END_IF;
 END_PROGRAM
 
@@ -54,16 +54,20 @@ TEST_F(Debugging, OfStructuredTextIsDoneByItsLines) {
   ASSERT_EQ(built.exit_code, 0) << built.output;
   start(program);
   attach();
-  const auto made = command("break press.st:8 if n = 8");
+  command("break Press:16");
+  ASSERT_TRUE(halts("fast")) << state().dump(2);
+  EXPECT_EQ(stack("fast"), "Press:16");
+  EXPECT_EQ(process_->ask(ControlVerb::write_variable, "press1.one.n=100").code, ErrorCode::ok);
+  EXPECT_EQ(process_->ask(ControlVerb::write_variable, "press1.two.n=200").code, ErrorCode::ok);
+  command("delete *");
+  const auto made = command("break press.st:8 if n > 150");
   EXPECT_EQ(made.value("pou", ""), "Counter");
   EXPECT_EQ(made.value("line", 0), 9);
-  ASSERT_TRUE(halts("fast")) << state().dump(2);
-  EXPECT_EQ(stack("fast"), "Counter:9 Press:16");
-  EXPECT_EQ(task("fast")["stack"][0].value("instance", ""), "press1.left");
-  EXPECT_EQ(values_->read("press1.left.n"), "8");
   command("continue fast");
-  EXPECT_TRUE(eventually([&] { return stack("fast") == "Counter:9 Press:17"; }));
-  EXPECT_EQ(task("fast")["stack"][0].value("instance", ""), "press1.right");
+  // The names of a function block are those of the instance that comes there.
+  EXPECT_TRUE(eventually([&] { return stack("fast") == "Counter:9 Press:17"; })) << state().dump(2);
+  EXPECT_EQ(task("fast")["stack"][0].value("instance", ""), "press1.two");
+  EXPECT_EQ(values_->read("press1.one.n"), "101");
   command("delete *");
   command("until fast Twice:3");
   EXPECT_TRUE(eventually([&] { return stack("fast") == "Twice:3 Press:21"; })) << state().dump(2);
