@@ -16,9 +16,9 @@
 
 namespace plchost {
 
-/// What a debugger asks for: a part of the state, for a session.
+/// A request of a debugger: a part of the state, for a session.
 struct DebugPart {
-  std::uint64_t session = 0;  ///< 0: of somebody who only looks
+  std::uint64_t session = 0;  ///< 0: of a client that only looks
   std::uint64_t offset = 0;
   /// "SESSION OFFSET"; nothing: it is not that.
   [[nodiscard]] static std::optional<DebugPart> parse(std::string_view text) noexcept;

@@ -25,8 +25,8 @@ constexpr auto kStepPatience = std::chrono::seconds(5);
 constexpr double kWaitSeconds = 10;
 
 constexpr std::string_view kCommands =
-    "break PLACE [hits COUNT] [if CONDITION] [log TEXT]   PLACE: POU:LINE, FILE:LINE or POU; COUNT: =N, %N, "
-    ">=N\n"
+    "break PLACE [hits COUNT] [if CONDITION] [log TEXT]\n"
+    "  PLACE is POU:LINE, FILE:LINE or POU. COUNT is =N, %N or >=N.\n"
     "delete ID|*             list                        tasks\n"
     "continue [TASK|*]       pause [TASK|*]              wait [SECONDS]\n"
     "step [TASK]             next [TASK]                 out [TASK]          until PLACE\n"

@@ -53,7 +53,7 @@ struct LogTemplate {
   [[nodiscard]] static Result<LogTemplate> parse(std::string_view text, const FindValue& find);
 };
 
-/// What is left of a log point's hit until the control thread writes it down.
+/// A hit of a log point, until the control thread writes it down.
 struct LogHit {
   std::uint32_t breakpoint = 0;
   std::array<std::array<std::byte, LogTemplate::kMaxValueBytes>, LogTemplate::kMaxValues> values{};

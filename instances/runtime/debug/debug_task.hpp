@@ -17,7 +17,7 @@ namespace plchost {
 /// Why a task halts.
 enum class HaltReason : std::uint8_t { breakpoint, step, pause };
 
-/// What the threads of all tasks of a debug build share.
+/// The part that the threads of all tasks of a debug build share.
 struct DebugBoard {
   std::atomic<const BreakpointTable*> table{nullptr};
   std::atomic<bool> suspended{true};  ///< no task halts, and those that halt go on

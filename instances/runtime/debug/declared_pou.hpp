@@ -32,8 +32,8 @@ struct PouLine {
   bool operator==(const PouLine&) const = default;
 };
 
-/// What a debug build declares of itself; empty: it is none. Control thread; the log has the reason of a
-/// refusal.
+/// The POUs and instances that a debug build declares; empty: it is none. Control thread; the log has the
+/// reason of a refusal.
 class PouCollection {
  public:
   [[nodiscard]] RTS_RESULT declare(Plc_Pou* pou);

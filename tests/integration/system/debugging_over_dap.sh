@@ -24,7 +24,7 @@ echo "- lines of standard input"
 printf 'pause Other\nwait\ntasks\nquit\n' | plcctl debug line1 >"$cell/lines.txt" || fail "$(cat "$cell/lines.txt")"
 grep -q 'task Other halts: pause at Other:' "$cell/lines.txt" || fail "$(cat "$cell/lines.txt")"
 
-echo "- what cannot be"
+echo "- commands that are refused"
 refused "is no debug build" plcctl debug line2 tasks
 refused "no POU" plcctl debug line1 'break Nothing:3'
 refused "'help' lists them" plcctl debug line1 dance
