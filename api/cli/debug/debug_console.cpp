@@ -24,14 +24,14 @@ constexpr auto kLook = std::chrono::milliseconds(20);
 constexpr auto kStepPatience = std::chrono::seconds(5);
 constexpr double kWaitSeconds = 10;
 
-constexpr std::string_view kCommands =
-    "break PLACE [hits COUNT] [if CONDITION] [log TEXT]\n"
-    "  PLACE is POU:LINE, FILE:LINE or POU. COUNT is =N, %N or >=N.\n"
-    "delete ID|*             list                        tasks\n"
-    "continue [TASK|*]       pause [TASK|*]              wait [SECONDS]\n"
-    "step [TASK]             next [TASK]                 out [TASK]          until PLACE\n"
-    "stack [TASK]            print [NAME]                set NAME=VALUE      task NAME\n"
-    "halts all|one           help                        quit\n";
+constexpr std::array kCommands = {
+    "break PLACE [hits COUNT] [if CONDITION] [log TEXT]",
+    "  PLACE is POU:LINE, FILE:LINE or POU. COUNT is =N, %N or >=N.",
+    "delete ID|*             list                        tasks",
+    "continue [TASK|*]       pause [TASK|*]              wait [SECONDS]",
+    "step [TASK]             next [TASK]                 out [TASK]          until PLACE",
+    "stack [TASK]            print [NAME]                set NAME=VALUE      task NAME",
+    "halts all|one           help                        quit"};
 
 std::string place_text(const Json& frame) {
   return fmt::format("{}:{} ({}){}", frame.value("pou", ""), frame.value("line", 0U), frame.value("file", ""),
@@ -96,7 +96,7 @@ Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& r
          return Result<void>();
        }},
       {"help", [](auto&, const auto&) {
-         fmt::print("{}", kCommands);
+         fmt::print("{}\n", fmt::join(kCommands, "\n"));
          return Result<void>();
        }}};
   if (const auto own = kOwn.find(verb); own != kOwn.end()) return own->second(*this, rest);

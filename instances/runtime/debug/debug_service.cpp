@@ -9,6 +9,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/log/log.hpp"
@@ -17,8 +18,6 @@ namespace plchost {
 
 namespace {
 
-// The scheduler under which tasks of external events halt.
-constexpr std::string_view kHaltsExternal = "CmpSchedule";
 // Beyond that the variables of a POU lie elsewhere than its instance: they are shared.
 constexpr std::ptrdiff_t kMaxInstanceBytes = 16 << 20;
 
@@ -321,9 +320,11 @@ std::size_t DebugService::suspend(std::string_view why) {
 void DebugService::resume(std::string_view scheduler) {
   if (!attached()) return;
   scheduler_ = scheduler;
+  const auto known = find_scheduler(scheduler);
+  const bool external_halts = known && (*known)->halts_external_tasks;
   for (std::size_t i = 0; i < tasks_.size(); ++i) {
     const bool external = traits_of(program_.tasks->task(i).config().kind).names_event;
-    tasks_[i]->ignore(external && scheduler_ != kHaltsExternal);
+    tasks_[i]->ignore(external && !external_halts);
   }
   // Their places may be other ones in another version of the application.
   Breakpoints found;

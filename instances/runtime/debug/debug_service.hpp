@@ -33,9 +33,8 @@ namespace plchost {
 // at their next statements if the session says so. Breakpoints are exchanged while tasks run: a task says
 // which table it looks at, and the control thread keeps that one until no task does.
 //
-// suspend() lets all go and keeps any from halting. It is called for a stop, an exception, an exchange of the
-// scheduler or of the application. resume() puts the breakpoints in again, as far as their places are still
-// there.
+// suspend() lets all go and keeps any from halting. A stop, an exception, and an exchange of the scheduler or
+// of the application call it. resume() puts the breakpoints in again, as far as their places are still there.
 
 /// Control thread, unless said otherwise.
 class DebugService {

@@ -69,7 +69,7 @@ def stack(client, thread):
 
 def story(port):
     client = attached(port)
-    made = client.ask("setBreakpoints", source={"path": "/home/me/src/steps.st"},
+    made = client.ask("setBreakpoints", source={"path": "/engineer/src/steps.st"},
                       breakpoints=[{"line": 13, "condition": "n > 3"}, {"line": 900}])["breakpoints"]
     assert made[0]["verified"] and made[0]["line"] == 14, made
     assert not made[1]["verified"] and "statement" in made[1]["message"], made
@@ -101,7 +101,7 @@ def story(port):
     client.ask("stepIn", threadId=main)
     client.event("stopped")
     assert [one["name"] for one in stack(client, main)] == ["Twice", "Main"]
-    client.ask("setBreakpoints", source={"path": "/home/me/src/steps.st"}, breakpoints=[])
+    client.ask("setBreakpoints", source={"path": "/engineer/src/steps.st"}, breakpoints=[])
     assert client.ask("continue", threadId=main)["allThreadsContinued"] is False
 
     client.ask("pause", threadId=threads["Other"])
