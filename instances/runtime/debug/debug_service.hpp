@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "instances/runtime/debug/breakpoint.hpp"
@@ -50,6 +51,7 @@ class DebugService {
     TaskSet* tasks = nullptr;
     std::function<const PouCollection&()> pous;
     std::function<const VariableAccess&()> variables;
+    std::function<void()> before_go;  ///< tasks are about to go on: halts() says so already
   };
   [[nodiscard]] Result<void> attach(Program program);
   /// The application is a debug build, and its tasks are there.
@@ -71,6 +73,12 @@ class DebugService {
   std::size_t suspend(std::string_view why);
   void resume(std::string_view scheduler);
   [[nodiscard]] std::size_t halted() const noexcept;
+  /// The task with this number halts.
+  [[nodiscard]] bool halts(std::size_t task) const noexcept {
+    return task < tasks_.size() && tasks_[task]->halt().has_value();
+  }
+  /// All that halted have been let go, and none halts until resume().
+  [[nodiscard]] bool suspended() const noexcept { return suspended_; }
   /// An object of JSON with all that a debugger shows, at most `most` bytes.
   [[nodiscard]] std::string state(std::size_t most) const;
 
@@ -95,6 +103,9 @@ class DebugService {
   [[nodiscard]] Result<ValuePlace> find_value(std::uint32_t pou, std::string_view name) const;
   [[nodiscard]] std::string remark() const;
   void end_session(std::string_view why);
+  /// Task and rule of each.
+  void let_go(std::span<const std::pair<std::size_t, StepRule>> tasks);
+  void let_all_go();
   void publish(Breakpoints breakpoints);
   void collect();
   void arm() noexcept;

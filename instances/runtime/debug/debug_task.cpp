@@ -8,16 +8,6 @@
 
 namespace plchost {
 
-// The control thread frees a table when no task says that it looks at it. Either it sees this task's word, or
-// this task sees that the table was exchanged.
-const BreakpointTable* DebugTask::hold_table() noexcept {
-  for (;;) {
-    const BreakpointTable* const table = board_.table.load(std::memory_order_seq_cst);
-    looked_at_.store(table, std::memory_order_seq_cst);
-    if (board_.table.load(std::memory_order_seq_cst) == table) return table;
-  }
-}
-
 void DebugTask::statement(Plc_Frame& frame, std::uint64_t cycle) noexcept {
   if (FaultTrap::here() != &task_.trap()) return;  // an event variable is read
   if (ignored() || board_.suspended.load(std::memory_order_acquire)) return;
@@ -30,7 +20,7 @@ void DebugTask::statement(Plc_Frame& frame, std::uint64_t cycle) noexcept {
 // The id of the first that halts here; 0: none.
 std::uint32_t DebugTask::look_at_breakpoints(const Plc_Frame& frame) noexcept {
   std::uint32_t halts_at = 0;
-  if (const BreakpointTable* const table = hold_table()) {
+  if (const BreakpointTable* const table = table_.take(board_.table)) {
     for (const auto& breakpoint : table->at(frame.pPou->dwNumber, frame.dwLine)) {
       if (breakpoint->condition && !breakpoint->condition->holds(frame.pSelf)) continue;
       const std::uint64_t hit = breakpoint->hits->fetch_add(1, std::memory_order_relaxed) + 1;
@@ -42,7 +32,7 @@ std::uint32_t DebugTask::look_at_breakpoints(const Plc_Frame& frame) noexcept {
       }
     }
   }
-  looked_at_.store(nullptr, std::memory_order_release);
+  table_.let_go();
   return halts_at;
 }
 
@@ -73,8 +63,7 @@ void DebugTask::stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReaso
   const std::uint64_t number = halts() + 1;
   halt_ = {.frame = &frame, .cycle = cycle, .reason = reason, .breakpoint = breakpoint, .number = number};
   halts_.store(number, std::memory_order_relaxed);
-  pause_.store(false, std::memory_order_relaxed);
-  end_step();
+  (void)forget_steps();
   const std::uint32_t gate = gate_.load(std::memory_order_relaxed);
   const TimePoint from = MonotonicClock::now();
   task_.stand_still([this, gate] {
@@ -103,7 +92,6 @@ void DebugTask::let_go(const StepRule& step) noexcept {
   step_ = step;
   stepping_.store(step.kind != StepRule::Kind::none, std::memory_order_relaxed);
   halted_.store(0, std::memory_order_relaxed);
-  rouse();
 }
 
 void DebugTask::rouse() noexcept {

@@ -10,6 +10,7 @@
 #include "instances/plc_debug.h"
 #include "instances/runtime/debug/breakpoint.hpp"
 #include "instances/runtime/debug/step_rule.hpp"
+#include "instances/runtime/debug/table_hold.hpp"
 #include "schedulers/tasks/task.hpp"
 
 namespace plchost {
@@ -39,7 +40,11 @@ class DebugTask {
   [[nodiscard]] Task& task() const noexcept { return task_; }
   /// It halts at its next statement.
   void pause() noexcept { pause_.store(true, std::memory_order_relaxed); }
-  void forget_pause() noexcept { pause_.store(false, std::memory_order_relaxed); }
+  /// A pause or a step that is under way ends where the task stands. False: there was none.
+  bool forget_steps() noexcept {
+    const bool paused = pause_.exchange(false, std::memory_order_relaxed);
+    return stepping_.exchange(false, std::memory_order_relaxed) || paused;
+  }
   [[nodiscard]] bool is_to_pause() const noexcept { return pause_.load(std::memory_order_relaxed); }
   /// Breakpoints, steps and pauses of its statements are ignored from now on, or not any more.
   void ignore(bool ignored) noexcept { ignored_.store(ignored, std::memory_order_relaxed); }
@@ -56,20 +61,16 @@ class DebugTask {
   /// Nothing: it does not halt.
   [[nodiscard]] std::optional<Halt> halt() const noexcept;
   [[nodiscard]] bool steps() const noexcept { return stepping_.load(std::memory_order_relaxed); }
-  /// It goes on; only while it halts.
+  /// It is to go on; only while it halts. rouse() follows.
   void let_go(const StepRule& step) noexcept;
-  /// It looks again whether the tasks are suspended.
+  /// It goes on, if it was let go or the tasks are suspended.
   void rouse() noexcept;
-  /// A step that is under way ends where the task stands.
-  void end_step() noexcept { stepping_.store(false, std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t halts() const noexcept { return halts_.load(std::memory_order_relaxed); }
   [[nodiscard]] Duration halted_for() const noexcept {
     return Duration(halted_ns_.load(std::memory_order_relaxed));
   }
   /// It may be looking at that table.
-  [[nodiscard]] bool looks_at(const BreakpointTable* table) const noexcept {
-    return looked_at_.load(std::memory_order_seq_cst) == table;
-  }
+  [[nodiscard]] bool looks_at(const BreakpointTable* table) const noexcept { return table_.holds(table); }
   /// The hits of log points since the last call.
   void take_logs(const std::function<void(const LogHit&)>& with);
   [[nodiscard]] std::uint64_t take_lost_logs() noexcept {
@@ -77,7 +78,6 @@ class DebugTask {
   }
 
  private:
-  [[nodiscard]] const BreakpointTable* hold_table() noexcept;
   [[nodiscard]] std::uint32_t look_at_breakpoints(const Plc_Frame& frame) noexcept;
   void note(const Breakpoint& breakpoint, const void* self) noexcept;
   void stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReason reason,
@@ -94,7 +94,7 @@ class DebugTask {
   Halt halt_;
   std::atomic<std::uint64_t> halts_{0};
   std::atomic<std::int64_t> halted_ns_{0};
-  std::atomic<const BreakpointTable*> looked_at_{nullptr};
+  TableHold<BreakpointTable> table_;
   std::array<LogHit, kLogHits> logs_{};  // a ring of one writer and one reader
   std::atomic<std::uint64_t> logged_{0};
   std::atomic<std::uint64_t> taken_{0};

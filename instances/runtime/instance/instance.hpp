@@ -133,8 +133,12 @@ class Instance {
   [[nodiscard]] Result<std::string> debug(const std::string& command);
   void advance_debugger();
   [[nodiscard]] bool has_debugger() const noexcept;
-  /// All tasks that halt go on, and none halts until resume_debugging().
+  /// All tasks that halt go on, and none halts until resume_debugging(). Their outputs stay safe: a stop
+  /// follows.
   void let_tasks_go(std::string_view why);
+  /// The same, and outputs follow their cycles again.
+  void let_tasks_go_on(std::string_view why);
+  void show_halts() noexcept;
   void resume_debugging();
   /// "2 halted tasks were let go first", or nothing. Once.
   [[nodiscard]] std::string take_let_go();

@@ -28,7 +28,7 @@ Result<std::string> Instance::begin_change(const std::string& path) {
   }
   PLCHOST_TRY_ASSIGN(change_, OnlineChange::prepare(path, load_context(), *application_));
   change_ends_ = MonotonicClock::now() + kChangePatience;
-  let_tasks_go("another version takes over");
+  let_tasks_go_on("another version takes over");
   if (const auto held = take_over_now()) return finish_change(*held);
   return {};
 }

@@ -111,7 +111,7 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
 Result<std::string> Instance::set_scheduler(const std::string& name) {
   PLCHOST_TRY(find_scheduler(name));
   if (life_.state() == ApplicationState::running) {
-    let_tasks_go("the scheduler is exchanged");
+    let_tasks_go_on("the scheduler is exchanged");
     const auto switched = tasks_->switch_to(name, start_.settings.scheduler);
     if (switched) scheduler_ = name;
     resume_debugging();

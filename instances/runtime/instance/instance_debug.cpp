@@ -30,7 +30,8 @@ Result<void> Instance::attach_debugger() {
   PLCHOST_TRY(
       host_->debug().attach({.tasks = tasks_.get(),
                              .pous = [this]() -> const auto& { return host_->declaration().pous; },
-                             .variables = [this]() -> const auto& { return host_->variables().access(); }}));
+                             .variables = [this]() -> const auto& { return host_->variables().access(); },
+                             .before_go = [this] { show_halts(); }}));
   debug_page_->write(host_->debug().state(kMaxDebugState));
   spdlog::warn("the application is a debug build: engineers can halt its tasks");
   return {};
@@ -53,13 +54,26 @@ void Instance::advance_debugger() {
   const auto asked = debug_page_->asked();
   host_->debug().seen(asked.session, std::min(asked.when, now));
   host_->debug().advance(now);
+  show_halts();
   if (now < debug_shown_ + kShowPause) return;
   debug_shown_ = now;
   debug_page_->write(host_->debug().state(kMaxDebugState));
 }
 
+// Outputs of tasks that halt are safe: see SafeOutputs. Not while all are let go for a stop, which puts its
+// own state.
+void Instance::show_halts() noexcept {
+  if (host_->debug().suspended()) return;
+  host_->areas().outputs().halt([this](std::size_t task) { return host_->debug().halts(task); });
+}
+
 void Instance::let_tasks_go(std::string_view why) {
   if (has_debugger()) let_go_ += host_->debug().suspend(why);
+}
+
+void Instance::let_tasks_go_on(std::string_view why) {
+  host_->areas().outputs().halt([](std::size_t /*task*/) { return false; });
+  let_tasks_go(why);
 }
 
 void Instance::resume_debugging() {

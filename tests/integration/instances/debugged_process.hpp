@@ -20,9 +20,9 @@ class Debugging : public ::testing::Test {
  protected:
   using json = nlohmann::json;
 
-  void start(const std::string& program) {
-    process_ =
-        std::make_unique<InstanceProcess>(sandbox_, std::vector<std::string>{"--application", program});
+  void start(const std::string& program, std::vector<std::string> more = {}) {
+    more.insert(more.end(), {"--application", program});
+    process_ = std::make_unique<InstanceProcess>(sandbox_, more);
     process_->wait_until_up(true);
     values_ = std::make_unique<ValueClient>(sandbox_);
   }

@@ -1,4 +1,5 @@
-/* A program that can be debugged, written by hand: lines of "steps.st", of which there is no file. */
+/* A program that can be debugged, written by hand: lines of "steps.st", of which there is no file. The tasks
+ * Main and Edge write an output area each. */
 #include <string.h>
 
 #include "instances/plc_app.h"
@@ -23,6 +24,9 @@ static struct {
 static struct {
   int runs;
 } edge_program;
+
+static void* main_output;
+static void* edge_output;
 
 static const unsigned int twice_lines[] = {2};
 static const unsigned int counter_lines[] = {12, 14};
@@ -60,6 +64,7 @@ static void CDECL run_main(void) {
   main_program.doubled = run_twice(main_program.counter.n);
   PLC_STATEMENT(26);
   main_program.go = 1;
+  *(int*)main_output = main_program.cycles;
 }
 
 static void CDECL run_other(void) {
@@ -74,6 +79,7 @@ static void CDECL run_edge(void) {
   PLC_ENTER(edge, &edge_program);
   PLC_STATEMENT(42);
   ++edge_program.runs;
+  *(int*)edge_output = edge_program.runs;
 }
 
 static int declare_pous(void) {
@@ -83,6 +89,12 @@ static int declare_pous(void) {
          plc_debug_declare_instance(&main_pou, &main_program, "Main") == ERR_OK &&
          plc_debug_declare_instance(&counter, &main_program.counter, "Main.counter") == ERR_OK &&
          plc_debug_declare_instance(&other, &other_program, "Other") == ERR_OK;
+}
+
+static int declare_output(const char* name, unsigned int flags, const char* task, void** address) {
+  Plc_Area_Use use = {task, 0, 0, address};
+  Plc_Area area = {sizeof area, PLC_AREA_OUTPUT | flags, name, sizeof(int), 1, &use, 0, 0, 0};
+  return plc_declare_area(&area, NULL) != RTS_INVALID_HANDLE;
 }
 
 static void set_task(Task_Info* task, const char* name, short kind, short priority, void(CDECL* run)(void)) {
@@ -106,6 +118,9 @@ int CDECL plc_app_init(void) {
   setup.nTasks = 3;
   setup.ptaskinfo = tasks;
   if (!declare_pous()) return 1;
+  if (!declare_output("main", 0, "Main", &main_output) ||
+      !declare_output("edge", 0x8000, "Edge", &edge_output))
+    return 3;
   PLC_DECLARE_VARIABLE("Main.cycles", PLC_TYPE_DINT, main_program.cycles);
   PLC_DECLARE_VARIABLE("Main.doubled", PLC_TYPE_DINT, main_program.doubled);
   PLC_DECLARE_VARIABLE("Main.go", PLC_TYPE_BOOL, main_program.go);
