@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "api/cli/debug/foreign_json.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -52,11 +53,10 @@ Result<std::optional<nlohmann::json>> DapReader::next() {
   PLCHOST_TRY_ASSIGN(const auto length, length_in(std::string_view(pending_).substr(0, head)));
   const std::size_t begin = head + kHeadEnd.size();
   if (pending_.size() - begin < length) return std::nullopt;
-  auto message =
-      nlohmann::json::parse(pending_.begin() + static_cast<std::ptrdiff_t>(begin),
-                            pending_.begin() + static_cast<std::ptrdiff_t>(begin + length), nullptr, false);
+  auto message = object_in(std::string_view(pending_).substr(begin, length));
   pending_.erase(0, begin + length);
-  if (message.is_discarded() || !message.is_object()) return not_dap("its body is no object of JSON");
+  if (!message)
+    return not_dap(fmt::format("its body is no object of JSON of at most {} levels", kMaxJsonDepth));
   return message;
 }
 

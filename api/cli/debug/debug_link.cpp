@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "api/cli/debug/foreign_json.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/names.hpp"
@@ -23,9 +24,9 @@ std::unexpected<Error> bad_answer(std::string_view text) {
 }
 
 Result<nlohmann::json> parsed(std::string_view text) {
-  auto json = nlohmann::json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object()) return bad_answer(text);
-  return json;
+  auto json = object_in(text);
+  if (!json) return bad_answer(text);
+  return *std::move(json);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "instances/runtime/debug/debug_answer.hpp"
 #include "instances/runtime/debug/debug_service.hpp"
 #include "instances/runtime/debug/debug_words.hpp"
 #include "shm/base/names.hpp"
@@ -69,15 +70,15 @@ Result<std::string> DebugService::add_breakpoint(std::string_view text) {
   PLCHOST_TRY_ASSIGN(auto breakpoint, resolve(next_id_, std::move(order)));
   ++next_id_;
   const DeclaredPou& pou = program_.pous().pous()[breakpoint.place.pou];
-  const nlohmann::json answer{{"id", breakpoint.id},
+  auto answer = debug_answer({{"id", breakpoint.id},
                               {"pou", pou.name},
                               {"file", pou.file},
                               {"line", breakpoint.place.line},
-                              {"remark", remark()}};
+                              {"remark", remark()}});
   Breakpoints more = breakpoints_;
   more.push_back(std::make_shared<const Breakpoint>(std::move(breakpoint)));
   publish(std::move(more));
-  return answer.dump();
+  return answer;
 }
 
 Result<std::string> DebugService::remove_breakpoints(std::string_view id) {

@@ -8,6 +8,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "instances/runtime/debug/debug_answer.hpp"
 #include "instances/runtime/debug/debug_words.hpp"
 #include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
@@ -71,9 +72,8 @@ Result<std::string> DebugService::begin_session(bool take, TimePoint now) {
   halt_all_ = false;
   arm();
   spdlog::warn("a debugger attaches: session {}", session_);
-  return nlohmann::json{
-      {"session", session_}, {"lease_ms", kLease / std::chrono::milliseconds(1)}, {"remark", remark()}}
-      .dump();
+  return debug_answer(
+      {{"session", session_}, {"lease_ms", kLease / std::chrono::milliseconds(1)}, {"remark", remark()}});
 }
 
 Result<std::string> DebugService::carry_out(std::string_view verb, std::string_view rest) {
@@ -187,7 +187,7 @@ Result<std::string> DebugService::pause(std::string_view task) {
     tasks_[each]->pause();
     ++count;
   }
-  return nlohmann::json{{"paused", count}, {"remark", remark()}}.dump();
+  return debug_answer({{"paused", count}, {"remark", remark()}});
 }
 
 std::size_t DebugService::halted() const noexcept {

@@ -117,7 +117,8 @@ def story(port):
 
 def garbage(port):
     for bytes_ in (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"Content-Length: 99999999999\r\n\r\n", b"Content-Length: 3\r\n\r\n{}}",
-                   b"\0" * 5000, b"Content-Length: 4\r\n\r\n[[]]"):
+                   b"\0" * 5000, b"Content-Length: 4\r\n\r\n[[]]",
+                   b'Content-Length: 1000005\r\n\r\n{"a":' + b"[" * 500000 + b"]" * 499999 + b"}"):
         client = Client(port)
         client.socket.sendall(bytes_)
         try:

@@ -8,7 +8,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "instances/runtime/debug/debug_answer.hpp"
 #include "instances/runtime/debug/step_rule.hpp"
 
 namespace plchost {
@@ -196,6 +198,20 @@ TEST_F(StepRules, HaltWhereTheySay) {
   EXPECT_TRUE(halts(Kind::out, 1, 11, 6));
   EXPECT_TRUE(halts(Kind::until, 4, 10));
   EXPECT_FALSE(halts(Kind::until, 1, 11));
+}
+
+TEST(DebugAnswer, IsNoLongerThanAReply) {
+  const auto answer = [](std::size_t file, std::size_t remark) {
+    return nlohmann::json{{"id", 4'294'967'295U},
+                          {"pou", std::string(63, 'p')},
+                          {"file", std::string(file, '"')},
+                          {"line", 4'294'967'295U},
+                          {"remark", std::string(remark, 'r')}};
+  };
+  EXPECT_EQ(nlohmann::json::parse(debug_answer(answer(20, 100))), answer(20, 100));
+  EXPECT_FALSE(nlohmann::json::parse(debug_answer(answer(255, 100))).contains("file"));
+  EXPECT_LE(debug_answer(answer(255, 600)).size(), kMaxDebugAnswer);
+  EXPECT_THAT(debug_answer(answer(255, 600)), HasSubstr("ignored"));
 }
 
 }  // namespace
