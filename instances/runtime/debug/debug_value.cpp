@@ -13,6 +13,8 @@ DebugNumber read_as(std::span<const std::byte> bytes) noexcept {
   return static_cast<DebugNumber>(value);
 }
 
+constexpr DebugNumber kNanosecondsPerDay = 86'400e9L;
+
 DebugNumber timespec_number(std::span<const std::byte> bytes) noexcept {
   constexpr DebugNumber kNanoseconds = 1e9L;
   if (bytes.size() < 2 * sizeof(std::int64_t)) return 0;
@@ -59,8 +61,11 @@ DebugNumber number_of(VariableType type, std::span<const std::byte> value) noexc
     case VariableType::timespec_time_of_day:
     case VariableType::timespec_date_and_time:
       return timespec_number(value);
+    case VariableType::days_date:
+      return read_as<std::int64_t>(value) * kNanosecondsPerDay;
     case VariableType::string:
     case VariableType::counted_string:
+    case VariableType::sized_string:
       return 0;
   }
   return 0;

@@ -1,8 +1,10 @@
 #include "instances/runtime/debug/breakpoint.hpp"
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "instances/runtime/debug/debug_answer.hpp"
+#include "instances/runtime/debug/debug_value.hpp"
 #include "instances/runtime/debug/step_rule.hpp"
 
 namespace plchost {
@@ -198,6 +201,15 @@ TEST_F(StepRules, HaltWhereTheySay) {
   EXPECT_TRUE(halts(Kind::out, 1, 11, 6));
   EXPECT_TRUE(halts(Kind::until, 4, 10));
   EXPECT_FALSE(halts(Kind::until, 1, 11));
+}
+
+TEST(DebugNumbers, OfDatesAreNanosecondsInEachForm) {
+  const std::int64_t days = 3;
+  const std::int64_t nanoseconds = days * 86'400'000'000'000;
+  const std::array<std::int64_t, 2> timespec{days * 86'400, 0};
+  const DebugNumber date = number_of(VariableType::date, std::as_bytes(std::span(&nanoseconds, 1)));
+  EXPECT_EQ(number_of(VariableType::days_date, std::as_bytes(std::span(&days, 1))), date);
+  EXPECT_EQ(number_of(VariableType::timespec_date, std::as_bytes(std::span(timespec))), date);
 }
 
 TEST(DebugAnswer, IsNoLongerThanAReply) {
