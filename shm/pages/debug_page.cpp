@@ -14,6 +14,9 @@ namespace plchost {
 
 namespace {
 
+// A debugger that has not asked for the next part by then does not go on.
+constexpr auto kNextPart = std::chrono::milliseconds(100);
+
 /// 1: first.
 constexpr PageKind kDebugPageKind{.what = "page of a debugger",
                                   .magic = 0x6567'6170'6775'6264,  // "dbugpage"
@@ -51,6 +54,7 @@ void DebugPage::remove(std::string_view pool, std::string_view instance) noexcep
 void DebugPage::write(std::string_view state) {
   if (state == shown_ || state.size() > kMaxDebugState) return;
   shown_ = state;
+  read_since_.reset();
   const auto made = std::make_unique<DebugState>();
   made->version = ++version_;
   made->size = static_cast<std::uint32_t>(state.size());
@@ -61,6 +65,17 @@ void DebugPage::write(std::string_view state) {
 DebugPage::Asked DebugPage::asked() const noexcept {
   return {.session = layout().asking_session.load(std::memory_order_acquire),
           .when = TimePoint(Duration(layout().asked_ns.load(std::memory_order_relaxed)))};
+}
+
+bool DebugPage::is_being_read(TimePoint now) noexcept {
+  const TimePoint last{Duration(layout().reading_ns.load(std::memory_order_acquire))};
+  // A stranger may have written it.
+  if (last > now || now - last >= kNextPart) {
+    read_since_.reset();
+    return false;
+  }
+  if (!read_since_) read_since_ = now;
+  return now - *read_since_ < kLongestRead;
 }
 
 Result<std::string> read_debug_part(std::string_view pool, std::string_view instance, DebugPart part,
@@ -76,8 +91,9 @@ Result<std::string> read_debug_part(std::string_view pool, std::string_view inst
   }
   if (!memory) return std::unexpected(std::move(memory).error());
   auto& page = *reinterpret_cast<DebugPageLayout*>(memory->bytes().data());
+  const std::int64_t now_ns = MonotonicClock::now().time_since_epoch().count();
   if (part.session != 0) {
-    page.asked_ns.store(MonotonicClock::now().time_since_epoch().count(), std::memory_order_relaxed);
+    page.asked_ns.store(now_ns, std::memory_order_relaxed);
     page.asking_session.store(part.session, std::memory_order_release);
   }
   const auto state = page.state.read();
@@ -86,8 +102,10 @@ Result<std::string> read_debug_part(std::string_view pool, std::string_view inst
   const std::string head = fmt::format("{} {} ", state->version, size);
   const std::string_view rest =
       std::string_view(state->text.data(), size).substr(std::min<std::size_t>(part.offset, size));
+  const auto given = rest.substr(0, most - std::min(most, head.size()));
+  page.reading_ns.store(given.size() < rest.size() ? now_ns : 0, std::memory_order_release);
   // Another user may have written the page.
-  return head + printable(std::string(rest.substr(0, most - std::min(most, head.size()))));
+  return head + printable(std::string(given));
 }
 
 }  // namespace plchost

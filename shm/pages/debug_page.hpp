@@ -39,6 +39,7 @@ struct DebugPageLayout {
   // Written by the API server: the debugger that asked last, and when (CLOCK_MONOTONIC).
   std::atomic<std::uint64_t> asking_session{0};
   std::atomic<std::int64_t> asked_ns{0};
+  std::atomic<std::int64_t> reading_ns{0};  ///< when a part was read behind which there are others; 0: none
   Seqlock<DebugState> state;
 };
 
@@ -60,6 +61,10 @@ class DebugPage {
     TimePoint when;
   };
   [[nodiscard]] Asked asked() const noexcept;
+  /// A debugger is about to read the other parts of the state: another one would make it begin anew. Not for
+  /// longer than kLongestRead since the first such call, or since write().
+  [[nodiscard]] bool is_being_read(TimePoint now) noexcept;
+  static constexpr Duration kLongestRead = std::chrono::milliseconds(500);
 
  private:
   explicit DebugPage(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
@@ -70,6 +75,7 @@ class DebugPage {
   MemoryFile memory_;
   std::uint64_t version_ = 0;
   std::string shown_;
+  std::optional<TimePoint> read_since_;
 };
 
 /// The API server's end: "VERSION SIZE " and as much of the state from the offset on as `most` bytes hold.

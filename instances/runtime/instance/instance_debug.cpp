@@ -55,7 +55,7 @@ void Instance::advance_debugger() {
   host_->debug().seen(asked.session, std::min(asked.when, now));
   host_->debug().advance(now);
   show_halts();
-  if (now < debug_shown_ + kShowPause) return;
+  if (now < debug_shown_ + kShowPause || debug_page_->is_being_read(now)) return;
   debug_shown_ = now;
   debug_page_->write(host_->debug().state(kMaxDebugState));
 }
