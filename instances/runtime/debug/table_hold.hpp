@@ -4,8 +4,8 @@
 
 namespace plchost {
 
-/// A thread's word for the table that it looks at, so that another one can exchange tables meanwhile: that
-/// one puts the new table in, and frees the one before when no thread holds it any more. Real-time.
+/// A thread's word for the table that it looks at, so that another one can exchange tables meanwhile. That
+/// one puts the new table in. It frees the one before when no thread holds it any more. Real-time.
 template <class Table>
 class TableHold {
  public:

@@ -1,4 +1,4 @@
-// The outputs of tasks that a debugger halts: what a terminal is shown until they go on.
+// The outputs of tasks that a debugger halts, as a terminal sees them until the tasks go on.
 #include <cstddef>
 #include <fstream>
 
