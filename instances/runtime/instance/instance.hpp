@@ -132,6 +132,7 @@ class Instance {
   [[nodiscard]] Result<void> attach_debugger();
   [[nodiscard]] Result<std::string> debug(const std::string& command);
   void advance_debugger();
+  void show_debug_state();
   [[nodiscard]] bool has_debugger() const noexcept;
   /// All tasks that halt go on, and none halts until resume_debugging(). Their outputs stay safe: a stop
   /// follows.

@@ -32,7 +32,7 @@ Result<void> Instance::attach_debugger() {
                              .pous = [this]() -> const auto& { return host_->declaration().pous; },
                              .variables = [this]() -> const auto& { return host_->variables().access(); },
                              .before_go = [this] { show_halts(); }}));
-  debug_page_->write(host_->debug().state(kMaxDebugState));
+  show_debug_state();
   spdlog::warn("the application is a debug build: engineers can halt its tasks");
   return {};
 }
@@ -44,7 +44,7 @@ bool Instance::has_debugger() const noexcept {
 Result<std::string> Instance::debug(const std::string& command) {
   auto done = host_->debug().obey(command, MonotonicClock::now());
   spdlog::info("debug {}: {}", command, done ? *done : done.error().describe());
-  if (debug_page_) debug_page_->write(host_->debug().state(kMaxDebugState));
+  show_debug_state();
   return done;
 }
 
@@ -57,7 +57,11 @@ void Instance::advance_debugger() {
   show_halts();
   if (now < debug_shown_ + kShowPause || debug_page_->is_being_read(now)) return;
   debug_shown_ = now;
-  debug_page_->write(host_->debug().state(kMaxDebugState));
+  show_debug_state();
+}
+
+void Instance::show_debug_state() {
+  if (debug_page_) debug_page_->write(host_->debug().state(kMaxDebugState));
 }
 
 // Outputs of tasks that halt are safe: see SafeOutputs. Not while all are let go for a stop, which puts its
@@ -77,7 +81,9 @@ void Instance::let_tasks_go_on(std::string_view why) {
 }
 
 void Instance::resume_debugging() {
-  if (has_debugger() && life_.state() == ApplicationState::running) host_->debug().resume(scheduler_);
+  if (!has_debugger() || life_.state() != ApplicationState::running) return;
+  host_->debug().resume(scheduler_);
+  show_debug_state();  // before the reply
 }
 
 std::string Instance::take_let_go() {

@@ -58,6 +58,7 @@ TEST_F(DebuggingOutputs, AreSafeWhileTheirTaskHaltsAndFollowItsCyclesAgain) {
   ASSERT_TRUE(becomes(main_, PLC_IMAGE_STATE_RUNNING));
   command("break Main:24");
   ASSERT_TRUE(becomes(main_, PLC_IMAGE_STATE_HALTED));
+  ASSERT_TRUE(halts("Main"));
   EXPECT_EQ(stack_after("next"), "Main:26");
   EXPECT_TRUE(becomes(main_, PLC_IMAGE_STATE_HALTED));
   command("delete *");
