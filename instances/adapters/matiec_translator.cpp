@@ -125,7 +125,7 @@ class MatiecTranslator : public Translator {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }
     pous_ = std::move(made.pous);
-    return context_.has(context_.folder().write(kCode, made.text)) &&
+    return context_.has(context_.folder().replace(kCode, made.text)) &&
            context_.has(
                context_.folder().write(std::string(matiec::kDebugFile), matiec::debug_header(pous_)));
   }
