@@ -98,6 +98,7 @@ def story(port):
     assert client.event("stopped")["reason"] == "step"
     assert stack(client, main)[0]["line"] == 24
     assert client.ask("evaluate", expression="Main.counter.n")["result"] == "1002"
+    client.ask("evaluate", expression="Main.counter.step := 1", context="repl")  # as the next story expects it
     client.ask("stepIn", threadId=main)
     client.event("stopped")
     assert [one["name"] for one in stack(client, main)] == ["Twice", "Main"]
