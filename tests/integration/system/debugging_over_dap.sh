@@ -48,9 +48,9 @@ python3 "$(dirname "$0")/dap_client.py" "$port" vanish || fail "vanish"
 until_true 10 runs_on
 
 echo "- a debugger that is killed: the same, after its lease"
-plcctl debug line1 'break Main:24' wait 'wait 600' >/dev/null 2>&1 &
+plcctl debug line1 'break Main:24' wait 'wait 600' >"$cell/killed.txt" 2>&1 &
 others+=($!)
-halted() { plcctl debug line1 tasks 2>&1 | grep -q 'has session'; }
+halted() { grep -q 'task Main halts' "$cell/killed.txt"; }
 until_true 20 halted
 pkill -KILL -P $! 2>/dev/null || kill -KILL $!
 until_true 30 runs_on
