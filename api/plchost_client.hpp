@@ -234,7 +234,7 @@ class PLCHOST_CLIENT_API Client {
   /// The fate of the posts of each client; first (source all zero) of all together.
   std::vector<Writer> writers(const std::string& host = {});
   /// All figures of a task, at most a second old. From the first call on, the Client receives the figures of
-  /// all tasks that it sees, some KiB for each and second: on a large plant make one with Options::host for
+  /// all tasks that it sees, some KiB for each and second. On a large plant make one with Options::host for
   /// it. ClientError: timed_out: also if there is no such task.
   TaskStatistics statistics(const std::string& host, const std::string& instance, const std::string& task);
 
@@ -246,9 +246,9 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Node> nodes(const std::string& host = {}, const std::string& base = {});
   /// How blocks go from one of these nodes to another, or to other hosts.
   std::vector<Route> routes(const std::string& host = {}, const std::string& base = {});
-  /// All variables that an application declares, or those like one of the patterns: '*' any characters, '?'
-  /// one, case does not count; "Grid[1,2]" an element, "Grid[*]" each of them. By name. ClientError:
-  /// not_found: no such variable, or it declares none.
+  /// All variables that an application declares, or those like one of the patterns, by name. In a pattern '*'
+  /// is any characters, '?' one; "Grid[1,2]" is an element, "Grid[*]" each of them. Case does not count.
+  /// ClientError: not_found: no such variable, or it declares none.
   std::vector<Variable> variables(const std::string& host, const std::string& instance,
                                   const std::vector<std::string>& patterns = {});
   /// The same, with their values of one moment. ClientError: full: they are more than 1024, or some 200 kB.

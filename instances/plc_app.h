@@ -14,8 +14,8 @@
  *     plc-instance --check-application my.so
  *
  * Thread contexts: "control" is the runtime's one soft thread, on which plc_app_init, plc_app_exit, the hooks
- * of components and the callbacks run. "any" includes the cycle of a real-time task: such a function takes no
- * lock, does no allocation and no input or output.
+ * of components and the callbacks run. The context "any" includes the cycle of a real-time task: such a
+ * function takes no lock, does no allocation and no input or output.
  */
 #ifndef PLC_APP_H
 #define PLC_APP_H
@@ -145,7 +145,7 @@ RTS_RESULT CDECL plc_set_task_options(const char* pszTask, const Task_Options* p
 /* The task whose cycle (or event function) runs on this thread; NULL outside of one. Any. */
 Task_Info* CDECL plc_current_task(void);
 
-/* The handle of one of the application's tasks, from __sys__setup__tasks on; it stays valid until the process
+/* The handle of one of the application's tasks, from __sys__setup__tasks on. It stays valid until the process
  * ends. *pResult (may be NULL): ERR_OK; with RTS_INVALID_HANDLE: ERR_NO_OBJECT: no task of that name;
  * ERR_PARAMETER; ERR_NOTINITIALIZED. Compares names: in a cycle keep the handle instead. Any. */
 RTS_HANDLE CDECL SchedGetTaskHandle(const char* pszTask, RTS_RESULT* pResult);
@@ -262,7 +262,7 @@ typedef struct {
 RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
 
 /* The address of the area for the caller. An input or output: the copy of the task whose cycle runs on this
- * thread; null outside of a cycle (an event function is outside) or if the task does not use it. Any other
+ * thread. Null outside of a cycle (an event function is outside) or if the task does not use it. Any other
  * area: the place where it lies. Null: no such handle, or not placed yet. Any. */
 void* CDECL plc_area_address(RTS_HANDLE hArea);
 
@@ -327,10 +327,10 @@ RTS_RESULT CDECL SchedGetClockState(RTS_HANDLE hTask, Clock_State* pState);
 /* ---- External events ----------------------------------------------------------------------------------- */
 
 /*
- * An external event has a name and is counted: n posts run each bound task n times. "ready" is this
- * instance's own event; "packer1/product" is the event "product" of the instance packer1. A task is bound to
- * an own event by its stExternalEvent, and registration is a separate act: before or after, by the
- * application, by a component, or by the operator. Posting to an event that is not registered counts nothing.
+ * An external event has a name and is counted: n posts run each bound task n times. The event "ready" is this
+ * instance's own; "packer1/product" is the event "product" of the instance packer1. A task is bound to an own
+ * event by its stExternalEvent, and registration is a separate act: before or after, by the application, by a
+ * component, or by the operator. Posting to an event that is not registered counts nothing.
  *
  * Registers an own event, or gives access to an event of another instance (whose registration is that
  * instance's own). The handle stays valid until the process ends. *pResult (may be NULL): ERR_OK;
@@ -413,7 +413,7 @@ typedef struct {
 } Block_Info;
 
 /* The channel of that name: 1 to PLC_MAX_CHANNEL_NAME letters, digits, '_', '-', '.'. The same name has the
- * same handle; it stays valid until the process ends. *pResult (may be NULL): ERR_OK; with
+ * same handle. It stays valid until the process ends. *pResult (may be NULL): ERR_OK; with
  * RTS_INVALID_HANDLE: ERR_PARAMETER, ERR_NOMEMORY, ERR_NOTINITIALIZED, ERR_FAILED: the instance can be no
  * node; the log says why. Control. */
 RTS_HANDLE CDECL plc_channel_open(const char* pszName, RTS_RESULT* pResult);
@@ -475,10 +475,10 @@ void CDECL plc_log(int nLevel, const char* pszText);
 /*
  * A component extends the runtime (a driver that posts events, say). It is a shared object that exports
  * plc_app_abi and HookFunction, named in the settings: [ComponentManager] Component.1=FILE. Each hook is
- * called for all components before the next one: CH_INIT, CH_INIT2, CH_INIT3 in the order of their numbers,
- * before the application is loaded; CH_EXIT3, CH_EXIT2, CH_EXIT in reverse order, after the application's
- * tasks have ended. Another result than ERR_OK from a CH_INIT.. ends the start of the instance. Threads are
- * started in CH_INIT3 and have ended when CH_EXIT3 returns. Unknown hooks return ERR_OK.
+ * called for all components before the next one. CH_INIT, CH_INIT2, CH_INIT3 come in the order of their
+ * numbers, before the application is loaded. CH_EXIT3, CH_EXIT2, CH_EXIT come in reverse order, after the
+ * application's tasks have ended. Another result than ERR_OK from a CH_INIT.. ends the start of the instance.
+ * Threads are started in CH_INIT3 and have ended when CH_EXIT3 returns. Unknown hooks return ERR_OK.
  * CH_TRIAL is the only hook that the trial of an application calls, in a process of its own, while the
  * instance runs with the component initialised. The component checks whether its CH_INIT.. would succeed, and
  * takes nothing. Another result than ERR_OK refuses the application.

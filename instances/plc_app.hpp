@@ -175,7 +175,7 @@ struct AreaOptions {
 };
 
 /// A memory area that holds a T. Empty until it comes from Application::area, and usable from the first cycle
-/// on: an input or output only within cycles of tasks that use it, each of which sees its own copy.
+/// on. An input or output is usable only within cycles of tasks that use it, each of which sees its own copy.
 template <class T>
 class Area {
   static_assert(std::is_trivially_copyable_v<T>, "an area is copied byte by byte");
@@ -347,9 +347,9 @@ class Application {
     return Area<T>(handle);
   }
 
-  /// Variables that an online change carries over, copied byte by byte to where the next version of the
-  /// program has those of this name: a struct with the state of the machine, say. `layout`: another number
-  /// when T's members mean something else. Nothing in it points into the program.
+  /// Variables that an online change carries over: a struct with the state of the machine, say. They are
+  /// copied byte by byte to where the next version of the program has those of this name. `layout`: another
+  /// number when T's members mean something else. Nothing in it points into the program.
   template <class T>
   void keep(const std::string& name, T& variables, unsigned long layout = 0) {
     static_assert(std::is_trivially_copyable_v<T>, "variables are copied byte by byte");
@@ -360,9 +360,9 @@ class Application {
     }
   }
 
-  /// A variable that can be seen, and written and forced unless it is const, from outside by its name: a
-  /// number, a bool, std::chrono::nanoseconds (TIME), characters (STRING), an std::atomic of those, and
-  /// arrays. An array's dimensions are counted from options.first. Static, or as long-lived.
+  /// A variable that can be seen from outside by its name, and written and forced unless it is const. It may
+  /// be a number, a bool, std::chrono::nanoseconds (TIME), characters (STRING), an std::atomic of those, or
+  /// an array. An array's dimensions are counted from options.first. Static, or as long-lived.
   template <class T>
   void variable(const std::string& name, T& variable, const VariableOptions& options = {}) {
     Plc_Variable declared{};

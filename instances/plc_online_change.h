@@ -39,7 +39,7 @@ extern "C" {
 #define PLC_MAX_VARIABLE_BYTES 0x100000u /* of all of them: they are copied while all tasks wait */
 
 /* Names variables that an online change carries over: dwBytes at pAddress, which are copied to where the new
- * version has its variable of this name. qwLayout is yours: it changes when the meaning of the bytes does.
+ * version has its variable of this name. Your qwLayout changes when the meaning of the bytes does.
  * A variable that only the new version names keeps its initial value. From plc_app_init only. ERR_OK;
  * ERR_PARAMETER: null, no bytes, or pszName is not 1 to PLC_MAX_VARIABLE_NAME letters, digits, _ - . ;
  * ERR_DUPLICATE: one of that name; ERR_NOMEMORY: too many, or too many bytes; ERR_NOTINITIALIZED. Control. */

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The main job, shown: builds plchost, runs three control programs on this machine's cores, each under a scheduler of
-# its own, posts events over DDS, kills an instance, switches a scheduler, and stops everything.
+# The main job, shown. It builds plchost, and runs three control programs on this machine's cores, each under a
+# scheduler of its own. It posts events over DDS, kills an instance, switches a scheduler, and stops everything.
 #   manager/demo.sh          the show, below two minutes after the build
 #   manager/demo.sh --keep   leaves it running, and says what to try
 #   --build DIR              takes the programs of that build, and builds nothing

@@ -18,9 +18,9 @@
  * Results: 0 and above is success, below 0 is failure; then plc_pool_error() says in words what was wrong. A
  * handle is used by any number of threads at once, and closed by one when no other uses it (any more).
  *
- * Contexts: "set-up" takes the pool's lock and may allocate; "any" includes the cycle of a real-time task:
- * bounded by its timeout, no allocation, and no system call unless it has to wait or to wake. After fork()
- * the child opens the pool anew.
+ * Contexts: "set-up" takes the pool's lock and may allocate. The context "any" includes the cycle of a
+ * real-time task: bounded by its timeout, no allocation, and no system call unless it has to wait or to wake.
+ * After fork() the child opens the pool anew.
  */
 #ifndef PLC_POOL_H
 #define PLC_POOL_H

@@ -30,8 +30,8 @@
  *
  *     if (plc_image_silence_ns(&outputs) > limit) ... its own safe state
  *
- * The file is a memory of the pool: an object like all others once anybody opens it by name there, or the
- * manager has looked, provided that its owner may write the pool.
+ * The file is a memory of the pool. It is an object like all others once anybody opens it by name there, or
+ * the manager has looked, provided that its owner may write the pool.
  *
  * If the file is removed, an instance's next start or the next plc_image_open makes it anew: see
  * plc_image_gone().
@@ -101,7 +101,8 @@ typedef struct {
   plc_image_u64 writer;       /* its process number */
   plc_image_i64 heartbeat_ns; /* CLOCK_MONOTONIC, its last sign */
   plc_image_u64 latest;       /* sequence of the latest image * 256 + its slot; 0: none yet */
-  plc_image_u64 reserved[7];
+  plc_image_u64 holds;        /* 1: outputs hold while no task drives them; 0: their age counts */
+  plc_image_u64 reserved[6];
 } plc_image_header;
 
 typedef struct {
@@ -261,20 +262,25 @@ static __inline__ plc_image_i64 plc_image_age_of(plc_image_i64 stamp_ns) {
   return stamp_ns <= 0 || stamp_ns > now ? PLC_IMAGE_NEVER : now - stamp_ns;
 }
 
-/* Since the latest image was published, whatever is shown; or PLC_IMAGE_NEVER. Real-time. */
-static __inline__ plc_image_i64 plc_image_age_ns(const plc_image* image) {
+/* Since the image that `word` of the header names was published; or PLC_IMAGE_NEVER. Real-time. */
+static __inline__ plc_image_i64 plc_image_age_by(const plc_image* image, const plc_image_u64* word) {
   int attempt;
   for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
-    const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE);
+    const plc_image_u64 named = __atomic_load_n(word, __ATOMIC_ACQUIRE);
     const plc_image_slot* slot;
     plc_image_i64 stamp_ns;
-    if (latest == 0 || (latest & 0xffu) >= PLC_IMAGE_SLOTS) break;
-    slot = plc_image_slot_at(image, (unsigned int)(latest & 0xffu));
+    if (named == 0 || (named & 0xffu) >= PLC_IMAGE_SLOTS + PLC_IMAGE_SAFE_SLOTS) break;
+    slot = plc_image_slot_at(image, (unsigned int)(named & 0xffu));
     stamp_ns = __atomic_load_n(&slot->stamp_ns, __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_ACQUIRE);
-    if (__atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) == latest >> 8) return plc_image_age_of(stamp_ns);
+    if (__atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) == named >> 8) return plc_image_age_of(stamp_ns);
   }
   return PLC_IMAGE_NEVER;
+}
+
+/* Since the latest image was published, whatever is shown; or PLC_IMAGE_NEVER. Real-time. */
+static __inline__ plc_image_i64 plc_image_age_ns(const plc_image* image) {
+  return plc_image_age_by(image, &image->header->latest);
 }
 
 /* Since the last sign of the writer; or PLC_IMAGE_NEVER: it gives none. Real-time. */
@@ -284,22 +290,19 @@ static __inline__ plc_image_i64 plc_image_heartbeat_age_ns(const plc_image* imag
 
 /* How long nobody has said which outputs hold; 0: the writer gives signs, or has told its end. While it runs
  * this is the age of the latest image, so the limit must be longer than the interval of the tasks. While its
- * tasks rest it is the time since the fifth sign that is missing. PLC_IMAGE_NEVER: nothing was written yet.
- * Real-time. */
+ * tasks rest it is the time since the fifth sign that is missing. If its settings name no safe state, it is
+ * the age in each state. PLC_IMAGE_NEVER: nothing was written yet, or it is spoiled. Real-time. */
 static __inline__ plc_image_i64 plc_image_silence_ns(const plc_image* image) {
-  plc_image_i64 age_ns;
-  switch (plc_image_state(image)) {
-    case PLC_IMAGE_STATE_ENDED:
-      return 0;
-    case PLC_IMAGE_STATE_STOPPED:
-    case PLC_IMAGE_STATE_EXCEPTION:
-    case PLC_IMAGE_STATE_HALTED:
-      age_ns = plc_image_heartbeat_age_ns(image);
-      if (age_ns == PLC_IMAGE_NEVER) return age_ns;
-      return age_ns > PLC_IMAGE_PATIENCE_NS ? age_ns - PLC_IMAGE_PATIENCE_NS : 0;
-    default:
-      return plc_image_age_ns(image);
-  }
+  const plc_image_header* const header = image->header;
+  const plc_image_u64 control = plc_image_control(image);
+  const plc_image_u64 state = control & PLC_IMAGE_STATE;
+  const int rests = state >= PLC_IMAGE_STATE_STOPPED && state <= PLC_IMAGE_STATE_ENDED;
+  const int safe = (control & PLC_IMAGE_SHOWS_SAFE) != 0;
+  const plc_image_i64 age_ns = plc_image_age_by(image, safe ? &header->safe : &header->latest);
+  const plc_image_i64 sign_ns = state == PLC_IMAGE_STATE_ENDED ? 0 : plc_image_heartbeat_age_ns(image);
+  if (!rests || __atomic_load_n(&header->holds, __ATOMIC_RELAXED) == 0) return plc_image_age_ns(image);
+  if (age_ns == PLC_IMAGE_NEVER || sign_ns == PLC_IMAGE_NEVER) return PLC_IMAGE_NEVER;
+  return sign_ns > PLC_IMAGE_PATIENCE_NS ? sign_ns - PLC_IMAGE_PATIENCE_NS : 0;
 }
 
 /* For the writer, beside plc_image_write: one process at a time. */
@@ -311,6 +314,11 @@ static __inline__ void plc_image_set_safe(const plc_image* image, const void* by
   const plc_image_u64 sequence = plc_image_next_sequence(before);
   plc_image_fill(image, number, sequence, bytes, plc_image_now_ns());
   __atomic_store_n(&image->header->safe, sequence << 8 | number, __ATOMIC_RELEASE);
+}
+
+/* 0: nobody says that outputs hold while no task drives them, so readers go by the age. Set-up. */
+static __inline__ void plc_image_hold(const plc_image* image, int holds) {
+  __atomic_store_n(&image->header->holds, holds ? 1u : 0u, __ATOMIC_RELAXED);
 }
 
 /* Tells a state, and whether the safe image is shown, if nothing was told since `told`. 1: done. Any context.
@@ -452,6 +460,7 @@ static __inline__ void plc_image_tell_nothing(const plc_image* image) {
   plc_image_u64 told;
   plc_image_take(image, (plc_image_u64)getpid());
   __atomic_store_n(&image->header->on_end, 0u, __ATOMIC_RELAXED);
+  plc_image_hold(image, 0);
   do {
     told = plc_image_control(image);
   } while (told != 0 && !plc_image_tell_since(image, told, PLC_IMAGE_STATE_UNTOLD, 0));

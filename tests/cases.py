@@ -9,7 +9,7 @@ next process continues with the case after it. If a process fails although none 
 runs again in a process of its own. A process that a case leaves running is a failure, too.
 --share    which cases: each N-th one, from the I-th one on (0 to N-1); GTEST_FILTER chooses among all, as usual
 --results  one line per case: result (passed, failed, skipped or retried), seconds and name, separated by tabs
---retries  a list of tests that may run a second time if they fail (tests/retries.txt)
+--retries  the tests that may run a second time if they fail (tests/retries.txt)
 --skips    a list of tests (tests/skips.txt). A case is skipped without being run if its reason there begins with "not run:"
 --without  cases that run elsewhere, names with * and ?, separated by colons
 --kind     of the build, for these lists: plain, address or thread

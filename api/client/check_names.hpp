@@ -9,9 +9,9 @@
 
 namespace plchost {
 
-/// The names that a client gets from its user, before they go into a sample of control.idl: a name that does
-/// not fit there would be cut, and mean another thing. invalid_argument: the text says what is allowed. Any
-/// context.
+/// The names that a client gets from its user are checked before they go into a sample of control.idl. A name
+/// that does not fit there would be cut, and mean another thing. invalid_argument: the text says what is
+/// allowed. Any context.
 [[nodiscard]] Result<void> check_host_name(std::string_view host);
 /// The same, by a client for one host (`only`; empty: for all): another one is refused, too.
 [[nodiscard]] Result<void> check_host_name(std::string_view host, std::string_view only);

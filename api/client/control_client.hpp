@@ -28,8 +28,9 @@ namespace plchost {
 /// addresses any. One thread at a time. Each call is one of its ClientCore, and is waited for; those that are
 /// under way there already go on meanwhile. A client for one host reads that host's partition only, so no
 /// other host sends it anything. It sees no other host, and refuses to address one (invalid_argument).
-/// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. invalid_argument, at
-/// once and with nothing sent: a name that no host, instance, event or task can have, or a text too long.
+/// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. A name that no host,
+/// instance, event or task can have, or a text that is too long, gives invalid_argument. Nothing is sent
+/// then.
 class ControlClient {
  public:
   /// A host that has not shown its presence for so long is gone.

@@ -15,8 +15,8 @@
 
 namespace plchost {
 
-/// The pieces of one download to one host: at most a window of them under way, and again from where the host
-/// is when nothing moves, or when a new plchost-dds begins anew.
+/// Sends the pieces of one download to one host, at most a window of them at a time. When nothing moves, or
+/// when a new plchost-dds begins anew, it sends again from where the host is.
 class FileSender {
  public:
   static constexpr Duration kRepeat = std::chrono::milliseconds(200);

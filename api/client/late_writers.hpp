@@ -10,8 +10,8 @@
 
 namespace plchost {
 
-/// Until when the hosts are waited for that DDS knows of and that have not shown themselves yet: for each
-/// kPatience at most, so that one that stands still delays no other for longer.
+/// Until when to wait for the hosts that DDS knows of and that have not shown themselves yet. Each gets
+/// kPatience at most, so one that stands still delays no other for longer.
 class LateWriters {
  public:
   static constexpr Duration kPatience = std::chrono::seconds(5);

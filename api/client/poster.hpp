@@ -49,7 +49,8 @@ class Poster {
   /// Unacknowledged posts at most.
   static constexpr std::size_t kWindow = 32;
   /// Repeats after so long without progress. It repeats sooner while DDS has no room for a post, and while
-  /// the server that was found last has not acknowledged anything yet: that may not have found this writer.
+  /// the server that was found last has not acknowledged anything yet. That server may not have found this
+  /// writer.
   static constexpr Duration kResend = std::chrono::milliseconds(200);
   static constexpr Duration kFirstResend = std::chrono::milliseconds(20);
 

@@ -9,8 +9,9 @@
 namespace plchost {
 
 /// The manager's control socket: "RUN_DIRECTORY/manager.sock". SEQPACKET, one message in one packet:
-/// ControlRequests in, one ControlReply out for each, when the thing is done (or failed, or took too long),
-/// so not in the order of the requests. A packet that is no request is answered with number 0 and `corrupt`.
+/// ControlRequests in, one ControlReply out for each. The reply comes when the thing is done (or failed, or
+/// took too long), so not in the order of the requests. A packet that is no request is answered with number 0
+/// and `corrupt`.
 [[nodiscard]] inline std::string manager_socket_path(std::string_view run_directory) {
   return std::string(run_directory) + "/manager.sock";
 }

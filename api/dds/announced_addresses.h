@@ -26,7 +26,7 @@ bool plc_can_tell_addresses(dds_entity_t participant);
 /// To which addresses this process announces itself by unicast.
 ///
 /// Cyclone DDS 0.10.2 adds the address of each participant that it discovers and that receives no multicast,
-/// and never removes one: after 10,000 clients have come and gone, it would send 10,000 datagrams with each
+/// and never removes one. After 10,000 clients have come and gone, it would send 10,000 datagrams with each
 /// announcement.
 size_t plc_announced_addresses(dds_entity_t participant, plc_Address* addresses, size_t most);
 

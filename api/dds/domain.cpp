@@ -145,7 +145,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   const std::string_view watermark = role == Role::server ? "32 MB" : "128 kB";
   // A client's writer keeps what a killed server has not confirmed until that one's lease ends, or until its
   // successor shows its presence (plc_forget_participant()). One that posts fast is full within 0.1 s and
-  // blocks until then. A secured host keeps the longer lease: when its process stands still and its clients
+  // blocks until then. A secured host keeps the longer lease. When its process stands still and its clients
   // drop it, the host still knows them, and both need some 5 s to meet again.
   const std::string_view lease = role == Role::server && options.identity.empty() ? "500 ms" : "3 s";
   // Without multicast the announcement of a new server reaches no client, because clients have no known port.

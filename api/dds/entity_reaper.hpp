@@ -13,7 +13,7 @@
 
 namespace plchost::dds {
 
-/// Deletes DDS entities on a soft thread of its own: Cyclone waits in dds_delete() for threads of its own,
+/// Deletes DDS entities on a soft thread of its own. Cyclone waits in dds_delete() for threads of its own,
 /// which may get no core for a while, and for readers that do not acknowledge.
 class EntityReaper {
  public:

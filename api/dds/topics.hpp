@@ -23,7 +23,7 @@ inline constexpr Duration kPresenceDeadline = kPresence.qos.deadline;
 
 /// Of a topic's writers, and of readers that need no bound of their own.
 [[nodiscard]] Qos qos_of(const TopicInfo& topic);
-/// Of a reader of what hosts show, which keeps more of each key than the topic says: samples of another host
+/// For a reader of what hosts show: it keeps more of each key than the topic says. Samples of another host
 /// under that key must not push out what has not been taken yet.
 [[nodiscard]] Qos shown_qos(const TopicInfo& topic);
 /// Of the reader of a host, with its bound: one that is full makes the writer wait. Back-pressure, no loss.

@@ -14,7 +14,7 @@
 
 namespace plchost {
 
-/// Blocks from other hosts, on their way into this one: those whose queue is full, or whose link is being
+/// Blocks from other hosts, on their way into this one. Those whose queue is full, or whose link is being
 /// made, wait here, in order, each node and priority by itself. One thread.
 class PendingBlocks {
  public:

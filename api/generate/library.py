@@ -2,8 +2,9 @@
 
 A type of the library is one of the contract without "Status": HostStatus is Host. A member keeps its name but for its unit,
 which its C++ type has. The key that names the thing itself is `name`. Left out are `epoch`, `round`, `ext` and what HostStatus counts.
-The types are those that HostStatus counts, and those with `library:`. That says what is otherwise, in parts with ";" between: "as NAME"
-(of the type), "MEMBER as NAME", "without MEMBER", and "extended" (plchost_client.hpp has a type of that name with more members).
+The types are those that HostStatus counts, and those with `library:`. That line says what is otherwise, in parts with ";" between: "as
+NAME" (of the type), "MEMBER as NAME", "without MEMBER", and "extended". The last one means that plchost_client.hpp has a type of that
+name with more members.
 """
 
 import dataclasses

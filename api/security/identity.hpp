@@ -29,9 +29,10 @@ struct OwnIdentity {
   Validity validity;
 };
 
-/// Whether the folder holds an identity that will be accepted: each file is there and of the right kind; the
-/// key is the certificate's and its owner's only; the certificate is valid now, signed by the authority and
-/// not revoked; governance and permissions are signed. The error names the file and what to do.
+/// Whether the folder holds an identity that will be accepted. Each file must be there and of the right kind.
+/// The key must be the certificate's, and its owner's only. The certificate must be valid now, signed by the
+/// authority and not revoked. Governance and permissions must be signed. The error names the file and what to
+/// do.
 [[nodiscard]] Result<OwnIdentity> check_identity(const std::string& folder);
 
 /// refused: not the identity of the host of that name, so that no other host and no client would believe it.

@@ -22,10 +22,10 @@ struct Answer {
   std::string text = {};
 };
 
-/// The answers that clients got, so that a repeated request is answered and not done twice: also for a client
-/// that was out of reach meanwhile, and that nobody can send anything to at this moment. A request that only
-/// reads is not remembered: it is done again. Bounded by clients, by answers of each and of all together.
-/// Control loop only.
+/// The answers that clients got, so that a repeated request is answered and not done twice. That holds also
+/// for a client that was out of reach meanwhile, and that nobody can send anything to at this moment. A
+/// request that only reads is not remembered: it is done again. Bounded by clients, by answers of each and of
+/// all together. Control loop only.
 class AnswerMemory {
  public:
   /// As many are remembered for each client.

@@ -7,7 +7,7 @@
 namespace plchost {
 
 /// Blocks of 128 KiB and more get pages of their own, which go back to the system when they are freed. That
-/// is malloc's default, but malloc gives it up at the first such block that is freed: from then on Cyclone's
+/// is malloc's default, but malloc gives it up at the first such block that is freed. From then on Cyclone's
 /// receive buffers, of 256 KiB each, lie among the small blocks of its clients. The next buffer does not fit
 /// into what the last one has left, because small blocks that stay have taken a part of it, and the heap
 /// grows. With one arena for all threads it grows no less, and threads of different priorities would wait for

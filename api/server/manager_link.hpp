@@ -38,7 +38,7 @@ class ManagerLink {
   /// How many commands may be under way, together and of one client: one client cannot take all places.
   static constexpr std::size_t kMaxPending = 64;
   static constexpr std::size_t kMaxPendingOfClient = 8;
-  /// The manager's time for one command: it ends a process (at most 40 s, of which 35 s are the two phases of
+  /// The manager's time for one command. It ends a process (at most 40 s, of which 35 s are the two phases of
   /// a stop) and sets up the next one (at most 30 s).
   static constexpr Duration kCommandLimit = std::chrono::seconds(75);
 

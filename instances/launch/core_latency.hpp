@@ -16,7 +16,7 @@ namespace plchost {
 // SYSFS/devices/system/cpu/cpuN/power/pm_qos_resume_latency_us says how long core N may take to wake up: "0"
 // is no limit, "n/a" is no latency at all. Unlike /dev/cpu_dma_latency it does not end with the process that
 // wrote it, so the value before is written down first, in "RUN_DIRECTORY/coreN.latency". Each holder has a
-// shared lock on that record, which the kernel takes back when the process ends, however it ends: a record
+// shared lock on that record, which the kernel takes back when the process ends, however it ends. So a record
 // without a holder is a hold that nobody wants any more. The last holder puts the value back and removes the
 // record; for one that was killed, the manager does, or the next instance with that run directory.
 

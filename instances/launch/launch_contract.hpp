@@ -85,7 +85,7 @@ enum class SetupStep : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(SetupStep step) noexcept;
 
-/// One packet on the report descriptor (a SEQPACKET socket): a step that is done (code ok), done with a
+/// One packet on the report descriptor (a SEQPACKET socket). It reports a step: done (code ok), done with a
 /// remark (ok and a text), or failed (the last one; the process then ends with kExitSetupFailed).
 struct SetupReport {
   SetupStep step = SetupStep::bind_core;

@@ -11,8 +11,8 @@ namespace plchost {
 
 /// The work of the helper process. Waits for disks and for the process that tries the file.
 ///
-/// Keeps a file: copies it, and the copy must have the announced digest, so that the sender can no longer
-/// change it; puts the copy in place; has it tried; writes its description; removes versions that are too
+/// Keeps a file. Copies it: the copy must have the announced digest, so that the sender can no longer change
+/// it. Then puts the copy in place, has it tried, writes its description, and removes versions that are too
 /// many. Gives its path. Was the same file loaded already, that one's. Of a file that is refused, and of a
 /// helper that was killed, nothing counts. corrupt: not the announced size or digest. invalid_argument: no
 /// application for this host; the text is that of the trial. timed_out: the trial. system: the disk is full,

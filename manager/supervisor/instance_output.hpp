@@ -12,7 +12,7 @@
 
 namespace plchost {
 
-/// The standard output and error of the processes of one instance: a named pipe in the run
+/// The standard output and error of the processes of one instance. They go into a named pipe in the run
 /// directory, which the manager reads into the instance's LogRing and onto its own standard error. No process
 /// waits for the manager: a full pipe takes nothing more. While no manager runs, the pipe keeps up to
 /// kPipeBytes for the next one, as long as the process of the instance runs. Reactor thread.

@@ -20,11 +20,11 @@ namespace plchost {
 //   backing_off  no process. It waits for the end of the back-off, or for a process that another manager made.
 //   setting_up   a process of this manager sets itself up. Limit: 30 s, then SIGKILL. Time in which other
 //                programs keep it from its processor does not count.
-//   adopting     a process that outlived its manager was asked for its status. Limit: 5 s; then it counts as
-//                up with a problem text if it has a status page, because a manager stops no PLC for being unable
-//                to talk to it. Without a page it is asked again every 2 s. If it was up before, or its set-up
-//                would be over, it counts as up, in exception, until it answers. If it ends in the set-up that
-//                a load began, the application before is set up again.
+//   adopting     a process that outlived its manager was asked for its status. Limit: 5 s. If it has a status
+//                page, it then counts as up with a problem text: a manager stops no PLC for being unable to talk
+//                to it. Without a page it is asked again every 2 s. If it was up before, or its set-up would be
+//                over, it counts as up, in exception, until it answers. If it ends in the set-up that a load
+//                began, the application before is set up again.
 //   up           the process answers, or is believed to. The process itself reports its state.
 //   ending       the process was asked to end. Limit: 38 s (a stop may take 10 s and 25 s), then SIGTERM, 2 s,
 //                SIGKILL. An adopted process may be in this phase already.

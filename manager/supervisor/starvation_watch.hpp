@@ -22,7 +22,7 @@ struct ProcessorUse {
   std::vector<ReadyThread> ready;  ///< that wait for nothing but the processor
 };
 
-/// For how long other programs have kept a process from its core: a thread of it was ready and got nothing,
+/// For how long other programs have kept a process from its core. A thread of it was ready and got nothing,
 /// and it was not the process itself that took the core. Pure.
 class StarvationWatch {
  public:

@@ -23,7 +23,7 @@ constexpr double kOneSided = 0.8;
 constexpr double kUsualTimes = 8;
 /// Noise that is larger than the tolerance by more is none: so far, and no further, what is usual widens.
 constexpr double kWidestNoiseNs = 100'000;
-/// A step has to be looked at for this many times the noise: a clock that stands still, or runs at half of
+/// A step has to be looked at for this many times the noise. A clock that stands still, or runs at half of
 /// its speed, is then further off than the noise can hide.
 constexpr double kTimesNoise = 4;
 /// One wild pair widens what is usual by no more than a pair at this many times of it would.

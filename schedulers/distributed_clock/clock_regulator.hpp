@@ -7,8 +7,8 @@
 
 namespace plchost {
 
-/// Learns the line between the local and the reference clock from pairs of stamps, never from wake-up times:
-/// those are late by tens of microseconds, and an integrator fed with them never settles. Pure, no
+/// Learns the line between the local and the reference clock from pairs of stamps, never from wake-up times.
+/// Those are late by tens of microseconds, and an integrator fed with them never settles. Pure, no
 /// allocation.
 ///
 /// A PI loop: each pair's deviation from the line moves the phase by Kp and the drift by Ki of it. The first

@@ -32,9 +32,9 @@ inline constexpr std::array kFaultSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SI
 #endif
 }
 
-/// One thread that runs an application's code: says for which task it does so now and since when, catches the
-/// faults of that code, and lets a watchdog stop it in the middle. A thread that is caught is parked where it
-/// stands, for good: its state is kept for diagnosis, and nothing of it is undone.
+/// One thread that runs an application's code. It says for which task it does so now and since when, catches
+/// the faults of that code, and lets a watchdog stop it in the middle. A thread that is caught is parked
+/// where it stands, for good: its state is kept for diagnosis, and nothing of it is undone.
 class FaultTrap {
  public:
   /// From now on this thread runs code of the task whose fault this is. Real-time; the trap's own thread.

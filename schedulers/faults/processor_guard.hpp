@@ -9,7 +9,7 @@
 namespace plchost {
 
 /// Finds a thread of this process whose real-time priority is above the supervision's, and which takes the
-/// processor from that, too. Nothing of the runtime runs then on this core, so the kernel looks: it counts
+/// processor from that, too. Nothing of the runtime runs then on this core, so the kernel looks. It counts
 /// for how long a real-time thread runs without a pause (RLIMIT_RTTIME) and interrupts it there (SIGXCPU). If
 /// the runtime has given no sign meanwhile, the thread gives its real-time priority up.
 ///

@@ -76,8 +76,8 @@ class TaskFault {
 /// Within a catch (...): raises the fault for the exception that is being handled. Real-time.
 void raise_current_exception(TaskFault& fault, bool event_variable = false) noexcept;
 
-/// The task has not come to the end of its cycle, or its event variable has not returned, within `limit`:
-/// raises the fault, and whatever its policy says no task begins another cycle. Nothing happens if a fault
+/// The task has not come to the end of its cycle, or its event variable has not returned, within `limit`.
+/// Raises the fault, and no task begins another cycle, whatever its policy says. Nothing happens if a fault
 /// was raised before. Control thread.
 void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit,
                         bool event_variable = false) noexcept;

@@ -55,8 +55,8 @@ class TakerSearch {
 /// runs again, and the task has a fault. If nothing of this process takes the processor, that is only told.
 class Starvation {
  public:
-  /// A task is ready to run for so long in vain: half of the time of the guard against endless loops, which
-  /// sees a thread that runs tasks, but no less than this.
+  /// A task is ready to run for so long in vain. It is half of the time of the guard against endless loops,
+  /// which sees a thread that runs tasks, but no less than this.
   static constexpr Duration kLeast = std::chrono::milliseconds(200);
   /// It looks so often within its limit.
   static constexpr int kLooks = 8;

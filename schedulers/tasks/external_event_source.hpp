@@ -20,9 +20,9 @@ struct EventCursor {
 };
 
 /// An external-event task sleeps on the event's own word: no thread of ours is between the poster and the
-/// task, under any scheduler. n posts give n runs; of a backlog beyond its bound the oldest posts are dropped
-/// and counted. A count that jumps back, or ahead by 16 times the bound, was written over: that is one run,
-/// and counted as lost.
+/// task, under any scheduler. For n posts there are n runs; of a backlog beyond its bound the oldest posts
+/// are dropped and counted. A count that jumps back, or ahead by 16 times the bound, was written over: that
+/// is one run, and counted as lost.
 class ExternalEventSource final : public ActivationSource {
  public:
   /// `max_backlog` >= 1.

@@ -19,7 +19,7 @@
 
 namespace plchost {
 
-/// One IEC task: its function, its statistics, and its TaskKindState, which outlives an exchange of its
+/// One IEC task: its function, its statistics, and its TaskKindState. That state outlives an exchange of its
 /// ActivationSource: the grid, the place in its external event, the level of its event variable.
 class Task {
  public:
@@ -42,7 +42,7 @@ class Task {
   [[nodiscard]] const ClockFollower* follower() const noexcept { return state_->follower(); }
 
   /// Set-up, while the task is parked, before begin() and before the variables of event tasks are read for
-  /// the first time: edges of the time in which it was parked do not count.
+  /// the first time. Edges of the time in which it was parked do not count.
   void forget_edges() noexcept { state_->forget_edges(); }
   /// Set-up, while the task is parked: a new grid from `origin` on. Releases of the time in which it was
   /// parked do not count; posts of that time are lost events. `takes_posts`: it runs for the posts from here

@@ -8,7 +8,7 @@
 namespace plchost {
 
 /// When the ticks of a device were due, on CLOCK_MONOTONIC: from their number and from when they were seen. A
-/// tick is never seen before it is due, and of 64 the earliest was seen with next to no delay: so the line
+/// tick is never seen before it is due, and of 64 the earliest was seen with next to no delay. So the line
 /// through the earliest ones is the device's own time. It follows the device's drift against CLOCK_MONOTONIC
 /// and is free of the wake-up latency of single ticks. Pure.
 class DeviceTime {

@@ -16,10 +16,10 @@ namespace plchost {
 /// Why a device no longer ticks for us.
 enum class TickFault : std::uint8_t { none, silent, off_frequency, broken };
 
-/// A clock device with an interrupt of its own: a real-time clock (/dev/rtc*: RTC_IRQP_SET, RTC_PIE_ON), an
-/// HPET (/dev/hpet: HPET_IRQFREQ, HPET_IE_ON), or whatever understands one of these two sets of ioctls; the
-/// device itself is asked. It outlives the schedulers that it ticks for, so that an exchange of them leaves
-/// its phase as it is.
+/// A clock device with an interrupt of its own. It is a real-time clock (/dev/rtc*: RTC_IRQP_SET,
+/// RTC_PIE_ON), an HPET (/dev/hpet: HPET_IRQFREQ, HPET_IE_ON), or whatever understands one of these two sets
+/// of ioctls. The device itself is asked. It outlives the schedulers that it ticks for, so that an exchange
+/// of them leaves its phase as it is.
 class TickDevice {
  public:
   /// unavailable: it cannot be opened. unsupported: it is no such device. The text says why. Set-up.

@@ -27,8 +27,8 @@ class TickTable::Slot final : public ActivationSource, public DueQueue::Entry {
 
   // A task that comes back while its tick is being worked off must not be missed. Either the task sees that
   // tick, or the tick sees the task: each writes its own word before it reads the other's, all of it
-  // sequentially consistent. If both do, the first to change `due` has it: the task leaves, or the tick
-  // claims it, and then the task takes its turn in the order, because others are woken by it.
+  // sequentially consistent. If both do, the first to change `due` has it. Either the task leaves, or the
+  // tick claims it, and then the task takes its turn in the order, because others are woken by it.
   std::optional<Activation> wait() noexcept override {
     const Activation activation = task_.next_release(rule_);
     const Duration interval = task_.interval();

@@ -15,7 +15,7 @@ namespace plchost {
 /// a lock. The tick queues the tasks that were handed in by their time and takes out those that are due. So
 /// its cost depends on these two numbers only, not on the number of tasks.
 ///
-/// The tick wakes only the first of them, and each task wakes the one after it before it runs: the tick
+/// The tick wakes only the first of them, and each task wakes the one after it before it runs. The tick
 /// outranks all tasks, so the highest priority would otherwise wait until all others were woken. A cycle that
 /// blocks or never ends holds up nobody, since the next task was woken before.
 ///
@@ -30,7 +30,7 @@ class TickTable {
   /// `frequency`: of the device that ticks, Hz; 0: the ticks come from `clock`.
   ///
   /// A device has a time of its own, which drifts against the clock that releases are planned in. So under a
-  /// device a task whose interval is a multiple of the tick runs on ticks: its release is the planned time of
+  /// device a task whose interval is a multiple of the tick runs on ticks. Its release is the planned time of
   /// the tick, and its grid follows the device. Other intervals keep the grid of the clock and wait for the
   /// next tick, as always.
   explicit TickTable(Clock& clock, std::uint32_t frequency = 0) noexcept

@@ -18,7 +18,7 @@ namespace plchost {
 /// Post is one atomic add, and at most one wake. Each waiter keeps a cursor of its own (how many posts it
 /// has seen), so nothing is consumed by anyone else and the event needs no list of waiters. `waiter` says
 /// that somebody may be asleep. The waker clears it afterwards, and only if the word is still the one that it
-/// made itself: each waiter changes `turns` before it sleeps, so an unchanged word means that all sleepers
+/// made itself. Each waiter changes `turns` before it sleeps, so an unchanged word means that all sleepers
 /// have been woken. A poster that ends at any point therefore leaves the flag set, never a sleeper without
 /// it; a waiter that ended costs one superfluous wake. A nudge changes `turns` too, without counting a post:
 /// it wakes a thread that shall stop or change what it waits on.

@@ -10,9 +10,9 @@
 namespace plchost {
 
 /// For a mapping of a file that others may cut short: where the file has ended, a touch is a SIGBUS. Under a
-/// guard the first such touch turns the whole mapping into zeros that belong to nobody, and goes on. That is
-/// the way that costs a real-time reader nothing: a pread of 64 bytes takes 0.8 us of each cycle, a
-/// jump out of the handler needs a saved context before each read.
+/// guard the first such touch turns the whole mapping into zeros that belong to nobody, and goes on. This way
+/// costs a real-time reader nothing. A pread of 64 bytes takes 0.8 us of each cycle, and a jump out of the
+/// handler needs a saved context before each read.
 class MemoryGuard {
  public:
   /// So many mappings of a process can be guarded.

@@ -171,7 +171,7 @@ std::uint32_t InLink::drop_all() noexcept {
 }
 
 // A block at the head stands in the way of all others. If nobody takes it, it is dropped with all that came
-// before now. Or it is not there: the sender has reserved its slots and never filled them, or a thread here
+// before now. Or it is not there. Then the sender has reserved its slots and never filled them, a thread here
 // has taken it and never given it back, or another program has written over it.
 std::uint32_t InLink::tidy_ring(std::size_t priority, TimePoint now, Duration hold) noexcept {
   RingReader& ring = rings_[priority];

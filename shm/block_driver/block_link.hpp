@@ -22,7 +22,7 @@ struct NodeLife {
 };
 
 /// A link as it lies in shared memory: the queues of one direction between one run of each of two nodes.
-/// Nothing in it is ever repaired: when one of the two ends, or finds that a stranger has written into it, a
+/// Nothing in it is ever repaired. When one of the two ends, or finds that a stranger has written into it, a
 /// fresh one takes its place, so that nothing can stay stuck in it.
 struct LinkLayout {
   std::uint64_t magic = 0;

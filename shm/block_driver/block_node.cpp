@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kPage = 4096;
 
-// A caller's bad pointer is to fault here, before anything of the queues is touched: a task that is stopped
+// A caller's bad pointer is to fault here, before anything of the queues is touched. A task that is stopped
 // with slots in its hand would keep them from everybody until the link is made anew.
 void touch_to_read(std::span<const std::byte> bytes) noexcept {
   const volatile std::byte* const at = bytes.data();

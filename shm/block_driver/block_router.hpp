@@ -15,9 +15,9 @@
 
 namespace plchost {
 
-/// The soft side of a node, one thread: makes and opens links, sees peers end, carries blocks between other
-/// nodes, spreads those for all, and drops blocks that are not taken. Real-time tasks never wait for it;
-/// without it links that are open go on working.
+/// The soft side of a node, one thread. It makes and opens links, sees peers end, carries blocks between
+/// other nodes, spreads those for all, and drops blocks that are not taken. Real-time tasks never wait for
+/// it; without it links that are open go on working.
 class BlockRouter {
  public:
   /// Also opens the node's link to itself. Set-up. `node` outlives the router.

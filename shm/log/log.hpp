@@ -5,7 +5,7 @@
 #include <spdlog/spdlog.h>
 
 // libfmt has it, and its header does not say so: each file that logs would compile all of fmt's formatting
-// anew. clang gives it another name than the g++ that libfmt was built with.
+// anew. With clang it has another name than with the g++ that libfmt was built with.
 #ifndef __clang__
 extern template void fmt::detail::vformat_to<char>(fmt::detail::buffer<char>&, fmt::string_view,
                                                    fmt::basic_format_args<fmt::buffer_context<char>>,

@@ -17,9 +17,9 @@ struct ForeignFile {
 };
 
 /// Takes away files that have the names of the pool, of its pages and of its memories and do not belong
-/// there: those of a user who is not trusted, folders, FIFOs, links. `rights`: those of the pool; a memory
-/// that is none of the runtime's own may belong to any user who may write the pool. For the manager, before
-/// it makes or opens any of them. Set-up.
+/// there. Those are files of a user who is not trusted, folders, FIFOs, links. `rights`: those of the pool; a
+/// memory that is none of the runtime's own may belong to any user who may write the pool. For the manager,
+/// before it makes or opens any of them. Set-up.
 [[nodiscard]] std::vector<ForeignFile> take_away_foreign_files(std::string_view pool,
                                                                const MemoryRights& rights);
 

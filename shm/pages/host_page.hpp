@@ -126,7 +126,7 @@ class HostPageReader {
   /// It was cut short, and tells nothing since: open it anew.
   [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
   /// Nothing if the writer was in the way (try again later), the page was cut short, or nothing valid was
-  /// written yet: names and texts are what they may be, without control characters.
+  /// written yet. Names and texts are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
   /// Numbers of the writes to a part, so that it need not be copied again: the same even number as before a

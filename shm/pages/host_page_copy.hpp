@@ -12,7 +12,7 @@
 namespace plchost {
 
 /// A copy of all that the manager has written to its page. A part that cannot be read at the moment stays as
-/// it was read last: that the manager is just writing an instance does not mean that there is no such
+/// it was read last. That the manager is just writing an instance does not mean that there is no such
 /// instance. One thread.
 class HostPageCopy {
  public:

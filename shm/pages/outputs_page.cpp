@@ -136,6 +136,14 @@ Result<OutputsPage> OutputsPage::create(std::string_view pool, std::string_view 
     return failure(ErrorCode::full,
                    fmt::format("{} areas of outputs, {} are allowed", outputs.size(), kMost));
   }
+  // Cut short it would name another file, and the manager would write that.
+  const auto long_one =
+      std::ranges::find_if(outputs, [](const LeftOutputs& one) { return one.device.size() > kMaxPath; });
+  if (long_one != outputs.end()) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("the path of the device {} has {} bytes, {} are allowed", long_one->device,
+                               long_one->device.size(), kMaxPath));
+  }
   const std::string name = outputs_page_name(pool, instance);
   const auto made = MemoryFile::replace(name, bytes_for(outputs),
                                         [&](std::span<std::byte> bytes) -> Result<void> {

@@ -11,8 +11,8 @@
 
 namespace plchost {
 
-/// The processes that hold objects, at most kMostReferencesTold for each, collected from the table of
-/// references part by part: the owner of the pool's mutex may let others have it in between. Set-up.
+/// The processes that hold objects, at most kMostReferencesTold for each. They are collected from the table
+/// of references part by part: the owner of the pool's mutex may let others have it in between. Set-up.
 class ObjectHolders {
  public:
   /// By the key of the object.

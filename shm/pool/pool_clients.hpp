@@ -18,10 +18,10 @@ class PoolClients {
 
   /// The calling process. Null: there are kMaxClients already.
   [[nodiscard]] ClientSlot* join(const ProcessIdentity& self, std::string_view name) noexcept;
-  /// Hands each client that has ended to `bury`, which releases what it held, or as much of it as it likes:
-  /// then it says false, and the client is handed to the next one. Whether the process is there is looked at
-  /// closely every kLook, and each time if `thoroughly`: one that was reaped is known at once in any case.
-  /// False: `bury` has said so.
+  /// Hands each client that has ended to `bury`, which releases what it held, or as much of it as it likes.
+  /// In the second case it says false, and the next sweep hands the client over again. Whether the process is
+  /// there is looked at closely every kLook, and each time if `thoroughly`: one that was reaped is known at
+  /// once in any case. False: `bury` has said so.
   bool sweep(TimePoint now, bool thoroughly, const std::function<bool(ClientSlot&)>& bury);
 
   /// For so long a process that is a zombie, or whose number was given to another one, counts as running.

@@ -16,8 +16,8 @@ enum class PostResult : std::uint8_t {
   not_registered,  ///< nothing was counted: the event is not (or no longer) registered
 };
 
-/// A handle on one external event of the pool, for programs that post to it and bind tasks to it: it is these
-/// registrations and bindings that hold the event, not the handle. Cheap to copy; valid while the ObjectPool
+/// A handle on one external event of the pool, for programs that post to it and bind tasks to it. These
+/// registrations and bindings hold the event, and not the handle. Cheap to copy; valid while the ObjectPool
 /// that gave it exists.
 class PoolEvent {
  public:

@@ -1,5 +1,5 @@
-// Blocks between two processes on two cores: CmpBlkDrvShm beside iceoryx, a Unix datagram socket, and memcpy
-// both within one core and into and out of shared memory, from core to core.
+// Blocks between two processes on two cores. CmpBlkDrvShm stands beside iceoryx, a Unix datagram socket, and
+// memcpy both within one core and into and out of shared memory, from core to core.
 // Each way copies what is sent in, and what is received out.
 
 #include <algorithm>

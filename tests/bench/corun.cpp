@@ -1,6 +1,6 @@
 // Each scheduler and the floor F at the same time on the same core, with the same priority, so that a stall
-// of the host hits both. Their grids lie half a period apart: neither is ready when the other is released, so
-// that they do not wait for each other; a stall, which is longer, is seen by both.
+// of the host hits both. Their grids lie half a period apart. So neither is ready when the other is released,
+// and they do not wait for each other; a stall, which is longer, is seen by both.
 
 #include <algorithm>
 #include <cmath>

@@ -33,8 +33,8 @@ void add_latencies(std::span<const Cycle> cycles, Samples& into);
 /// Releases of the grid that no cycle ran for.
 [[nodiscard]] std::uint64_t lost_cycles(std::span<const Cycle> cycles, Duration period) noexcept;
 
-/// Stalls of the host: stretches of time in which each of two loops on one core, out of step by half a
-/// period, started a cycle a whole period late or later. A gap that only one of them saw is not the host's.
+/// Stalls of the host. They are stretches of time in which each of two loops on one core, out of step by half
+/// a period, started a cycle a whole period late or later. A gap that only one of them saw is not the host's.
 struct Stalls {
   std::uint64_t stalls = 0;
   std::uint64_t late_ours =

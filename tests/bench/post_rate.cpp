@@ -1,5 +1,5 @@
-// External events over DDS at speed: a post and its acknowledgement beside a bare Cyclone DDS round trip;
-// posts one way as fast as they go beside a bare writer and a reader that takes and counts.
+// External events over DDS at speed. A post and its acknowledgement stand beside a bare Cyclone DDS round
+// trip. Posts one way, as fast as they go, stand beside a bare writer and a reader that takes and counts.
 
 #include <array>
 #include <memory>

@@ -48,7 +48,7 @@ class Samples {
 /// A figure that could not be measured, or says nothing: it is shown as such, and no target is met by it.
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
-/// In microseconds. kNotMeasured is a percentile that no sample lies above: p90 of less than 10 samples, p99
+/// In microseconds. A percentile without samples above it is kNotMeasured: p90 of less than 10 samples, p99
 /// of less than 100, p99.9 of less than 1,000, and all if there are none.
 struct Summary {
   double p50 = kNotMeasured;

@@ -1,6 +1,6 @@
 // 1,000 cyclic tasks of mixed periods in one instance, the faster ones above the slower ones, all beginning
-// at one instant: lost cycles beside those of 1,000 bare threads that do the same with clock_nanosleep. And
-// the CPU time per activation with 10, 100 and 1,000 tasks.
+// at one instant. Their lost cycles stand beside those of 1,000 bare threads that do the same with
+// clock_nanosleep. And the CPU time per activation with 10, 100 and 1,000 tasks.
 
 #include <array>
 #include <atomic>

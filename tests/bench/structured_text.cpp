@@ -1,5 +1,5 @@
-// Start latency of a 1 ms task in Structured Text, in a plc-instance under each scheduler. It is the time from
-// the planned release to the first instruction of the task, as the instance counts it. plcctl builds the
+// Start latency of a 1 ms task in Structured Text, in a plc-instance under each scheduler. It is the time
+// from the planned release to the first instruction of the task, as the instance counts it. plcctl builds the
 // program by each compiler that is there. Beside it F, in alternation.
 
 #include <array>
@@ -30,10 +30,10 @@ constexpr std::string_view kInstance = "text";
 constexpr std::string_view kProgram = R"(
 PROGRAM Main
   VAR raw AT %IW0 : INT; total AT %QD0 : DINT; lamp AT %QX4.0 : BOOL; END_VAR
-  VAR late : TON; i : INT; END_VAR
+  VAR late : TON; i : DINT; END_VAR
   late(IN := raw >= 0, PT := T#20ms);
   lamp := late.Q;
-  FOR i := 1 TO 10 DO total := total + i * raw; END_FOR;
+  FOR i := 1 TO 10 DO total := total + i * INT_TO_DINT(raw); END_FOR;
 END_PROGRAM
 CONFIGURATION bench
   RESOURCE text ON PLC

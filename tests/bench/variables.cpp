@@ -1,6 +1,6 @@
-// 1,000 variables of a running instance, read ten times a second as the API server reads them: the start
-// latency of its 1 ms task, and the processor time of its process. The floor is the same instance while
-// nobody reads, in alternation.
+// 1,000 variables of a running instance are read ten times a second, as the API server reads them. Measured
+// are the start latency of its 1 ms task, and the processor time of its process. The floor is the same
+// instance while nobody reads, in alternation.
 
 #include <filesystem>
 #include <thread>

@@ -44,8 +44,8 @@ void use(const InstancePageReader& page) {
 
 }  // namespace
 
-// The input is a list of [ place : 2 bytes ][ value : 1 byte ]: a stranger's writes into the page, into its
-// header and first tasks, or, with the highest bit of the place, among the buckets.
+// The input is a list of [ place : 2 bytes ][ value : 1 byte ]. These are a stranger's writes into the page,
+// into its header and first tasks, or, with the highest bit of the place, among the buckets.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<TaskIdentity> kIdentities(kTasks);
   static auto writer = InstancePage::create(pool_name(), kInstance, kIdentities);

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Folders are layers: each of the six folders (and tests) draws its own in its README.md, in a block ```layers, and
-# every include of the code has to follow an arrow. Usage: layers.sh [ROOT]; prints each wrong include and drawing.
+# Folders are layers. Each of the six folders (and tests) draws its own in its README.md, in a block ```layers. Every
+# include of the code has to follow an arrow. Usage: layers.sh [ROOT]; prints each wrong include and drawing.
 #
 #   main ─► ./ ─► a/ b/        a layer may include what lies to the right of its arrow, and what those may include
 #   * ─► shm/base/             every layer of this drawing may; a name that begins with one of the six is another house's
 #
-# A layer is a folder without its sub-folders ("a/"; "./": the top), a folder with all below it ("examples/..."), or the
-# files of one name ("a/name": a/name.hpp, a/name.cpp), which are then no part of their folder's layer. To the right of
-# an arrow "a/..." may also stand for all layers below a/.
+# A layer is a folder without its sub-folders ("a/"; "./": the top), or a folder with all below it ("examples/..."). It
+# may also be the files of one name ("a/name": a/name.hpp, a/name.cpp), which are then no part of their folder's layer.
+# To the right of an arrow "a/..." may also stand for all layers below a/.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
 exec python3 - <<'PYTHON'

@@ -2,7 +2,8 @@
 """One of each thing that the READMEs tell how to add is added to a scratch copy of the tree.
 
 It compiles, and the parts that are made from it name it. The files that were written by hand are those of the table below
-"To add a ..." in its README: each of them, no other, and not more than PLACES allows. places.txt has the texts.
+"To add a ..." in its README. It must be each of them, no other, and not more than PLACES allows. Their texts are in
+places.txt.
 
 Usage: places.py [ROOT [NAME...]] (a git checkout, else this one; names of PLACES, else all of them); prints each fault.
 """

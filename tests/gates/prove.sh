@@ -233,6 +233,14 @@ plant_in_prose "prose: comment in C" "shm/planted.h:2: begins with 'Whose': Whos
 plant_in_prose "prose: comment in Python" "tests/planted.py:1: begins with 'what': what it does" tests/planted.py "# Of the gate: what it does and sees."
 plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Whoever': Whoever asks" tests/planted.sh "true
 # W""hoever asks is answered."
+plant_in_prose "prose: long comment with a colon" "shm/base/planted.hpp:2: 31 words in a sentence, at most 30" shm/base/planted.hpp "int planted = 0;
+// A$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..11})."
+plant_in_prose "prose: long comment of parts in a table" "shm/base/planted.def:1: 31 words in a sentence, at most 30" shm/base/planted.def "// A$(printf ' word%.0s' {1..10}); a$(printf ' word%.0s' {1..9}): a$(printf ' word%.0s' {1..9})."
+plant_in_prose "prose: long comment in a script" "tests/planted.sh:1: 31 words in a sentence, at most 30" tests/planted.sh "# A$(printf ' word%.0s' {1..18}): a
+#$(printf ' word%.0s' {1..11})."
+plant_in_prose "prose: long docstring" "tests/planted.py:2: 31 words in a sentence, at most 30" tests/planted.py "def planted():
+    \"\"\"A$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..11}).\"\"\""
+plant_in_prose "prose: comment in a unit" "manager/planted.service.in:1: begins with 'What': What it needs" manager/planted.service.in "# What it needs: a core."
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
 plant_in_prose "prose: imperative in an error" "shm/base/planted.cpp:1: an error begins with an imperative: \"open \"" shm/base/planted.cpp \
   'return check_errno(::open(path.c_str(), O_RDONLY), "open " + path);'
@@ -247,7 +255,8 @@ plant_in_prose "prose: text of a picture" "api/planted.svg:2: 'DDS server' is no
 new_tree
 echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md"
 echo "Nobody waits. A client$(printf ' word%.0s' {1..15}): a$(printf ' word%.0s' {1..14}); a$(printf ' word%.0s' {1..12})." >>"$plot/tree/shm/planted.md"
-echo "// Takes$(printf ' word%.0s' {1..28}). timed_out: after$(printf ' word%.0s' {1..28})." >"$plot/tree/shm/planted.hpp" && commit_tree
+echo "// Takes$(printf ' word%.0s' {1..28}). timed_out: after$(printf ' word%.0s' {1..28})." >"$plot/tree/shm/planted.hpp"
+echo "// row: host$(printf '; word%.0s' {1..40})" >"$plot/tree/api/planted.idl" && commit_tree
 "$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }
 
 # plant_in_documents NAME DIAGNOSTIC FILE EXPRESSION: the whole tree, one file of it with that change (of sed)

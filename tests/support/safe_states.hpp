@@ -9,7 +9,7 @@ namespace plchost::testing {
 /// Words of the output area of the application `outputs`.
 using OutputWords = std::array<std::uint32_t, 4>;
 
-/// While its tasks run.
+/// The values that its tasks put out; of Valve, which waits, none.
 inline constexpr OutputWords kDriven{0x11111111, 0x22222222, 0, 0x44444444};
 
 /// A SafeState of that area, and what a terminal is shown then.
@@ -18,6 +18,11 @@ struct SafeCase {
   const char* setting;
   OutputWords shown;
   std::uint64_t registers;
+
+  /// While its tasks run, but for Valve, which waits: its bytes are safe until its first cycle.
+  [[nodiscard]] constexpr OutputWords driven() const {
+    return {0x11111111, 0x22222222, shown[2], 0x44444444};
+  }
 };
 
 /// Of SafeState Keep it is what the tasks have put out last.

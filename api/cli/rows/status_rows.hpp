@@ -53,9 +53,10 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
 
 }  // namespace status_rows
 
-/// The row of a topic, as control.idl has it; its field names are a promise to programs. Each field in its
-/// order, durations in us, times as a text and as a number, codes as words, GUIDs as digits ("all": of
-/// zeros); then what `ext` has, if there is one. Computed fields come from computed_of(sample, context...).
+/// The row of a topic, as control.idl has it; its field names are a promise to programs. Each field is in its
+/// order: durations in us, times as a text and as a number, codes as words, GUIDs as digits ("all": of
+/// zeros). Then come the entries of `ext`, if there are any. Computed fields come from computed_of(sample,
+/// context...).
 template <class Sample, class... Context>
   requires dds::kHasRow<Sample>
 [[nodiscard]] Row to_row(const Sample& sample, const Context&... context) {

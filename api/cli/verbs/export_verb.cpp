@@ -30,17 +30,28 @@ std::string time_now() {
                      parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
 }
 
-/// Those that the application of an instance declares: none, if it has no application.
-Result<std::vector<plc_VariableRecord>> variables_of(CliSession& session, const std::string& host,
-                                                     const std::string& instance) {
+/// A plant, and why not all of it was exported: a role may not read variables, or an instance does not
+/// answer.
+struct Export {
+  plcopen::ExportedPlant plant;
+  std::vector<Error> problems;
+};
+
+/// Those that the application of an instance declares: none, if it has no application, or does not tell them.
+std::vector<plc_VariableRecord> variables_of(CliSession& session, const std::string& host,
+                                             const std::string& instance, std::vector<Error>& problems) {
   auto variables = VariableSampler(session, host, instance, {}).all();
-  if (variables || variables.error().code != ErrorCode::not_found) return variables;
-  return std::vector<plc_VariableRecord>();
+  if (variables) return *std::move(variables);
+  Error error = std::move(variables).error();
+  if (error.code == ErrorCode::not_found) return {};
+  error.message = fmt::format("{}: exported without its variables: {}", instance, error.message);
+  problems.push_back(std::move(error));
+  return {};
 }
 
 /// Of the instances of a host that are wanted: empty: all of them.
 Result<ExportedHost> host_of(CliSession& session, const std::string& host,
-                             const std::vector<std::string>& wanted) {
+                             const std::vector<std::string>& wanted, std::vector<Error>& problems) {
   ExportedHost exported{.name = host, .instances = {}};
   PLCHOST_TRY_ASSIGN(auto* const client, session.client());
   PLCHOST_TRY_ASSIGN(const auto instances, client->instances(host, session.deadline()));
@@ -48,15 +59,14 @@ Result<ExportedHost> host_of(CliSession& session, const std::string& host,
   for (const plc_InstanceStatus& instance : instances) {
     const std::string name(dds::text_of(instance.instance));
     if (!wanted.empty() && std::ranges::find(wanted, name) == wanted.end()) continue;
-    PLCHOST_TRY_ASSIGN(const auto variables, variables_of(session, host, name));
-    exported.instances.push_back(exported_instance(name, tasks, variables));
+    exported.instances.push_back(exported_instance(name, tasks, variables_of(session, host, name, problems)));
   }
   return exported;
 }
 
-Result<plcopen::ExportedPlant> plant_of(CliSession& session, const std::vector<std::string>& names,
-                                        const std::string& version) {
-  plcopen::ExportedPlant plant{.product_version = version, .time = time_now(), .hosts = {}};
+Result<Export> plant_of(CliSession& session, const std::vector<std::string>& names,
+                        const std::string& version) {
+  Export result{.plant = {.product_version = version, .time = time_now(), .hosts = {}}, .problems = {}};
   std::vector<std::string> wanted;
   if (!names.empty()) {
     PLCHOST_TRY_ASSIGN(const auto instances, expand(session, names));
@@ -67,19 +77,21 @@ Result<plcopen::ExportedPlant> plant_of(CliSession& session, const std::vector<s
   }
   PLCHOST_TRY_ASSIGN(const auto hosts, session.shown_hosts());
   for (const HostView& host : hosts) {
-    PLCHOST_TRY_ASSIGN(auto exported, host_of(session, host.name, wanted));
-    if (wanted.empty() || !exported.instances.empty()) plant.hosts.push_back(std::move(exported));
+    PLCHOST_TRY_ASSIGN(auto exported, host_of(session, host.name, wanted, result.problems));
+    if (wanted.empty() || !exported.instances.empty()) result.plant.hosts.push_back(std::move(exported));
   }
-  return plant;
+  return result;
 }
 
 int export_plant(CliSession& session, const std::vector<std::string>& names, const std::string& version) {
-  const auto plant = plant_of(session, names, version);
-  if (!plant) return CliSession::fail(plant.error());
-  const std::string xml = plcopen::project_of(*plant);
-  if (std::fwrite(xml.data(), 1, xml.size(), stdout) == xml.size() && std::fflush(stdout) == 0)
-    return kExitDone;
-  return CliSession::fail(failure(ErrorCode::system, "cannot write the plant", errno).error());
+  const auto exported = plant_of(session, names, version);
+  if (!exported) return CliSession::fail(exported.error());
+  const std::string xml = plcopen::project_of(exported->plant);
+  if (std::fwrite(xml.data(), 1, xml.size(), stdout) != xml.size() || std::fflush(stdout) != 0)
+    return CliSession::fail(failure(ErrorCode::system, "cannot write the plant", errno).error());
+  int code = kExitDone;
+  for (const Error& problem : exported->problems) code = CliSession::fail(problem);
+  return code;
 }
 
 }  // namespace

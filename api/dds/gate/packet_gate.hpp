@@ -27,7 +27,7 @@ enum class Admission : std::uint8_t {
 ///   writers of discovery and liveliness are replaced by a gap, because Cyclone sends some of them in plain
 ///   text;
 /// - of an unsecured host: samples of all builtin writers but those of discovery and liveliness, and these
-///   in fragments (Cyclone copies what one fragment has into the memory that another one asked for).
+///   in fragments. Cyclone copies what one fragment has into the memory that another one asked for.
 /// At an unsecured host the parameters of a datagram that passes are cut down to those that the host needs,
 /// in place: see filter_parameters(). A message that is signed or encrypted as a whole is judged by its outer
 /// form only. Fragments of a handshake that pass go through HandshakeAssembly.

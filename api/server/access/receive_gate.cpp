@@ -30,8 +30,8 @@ bool is_of_network(const msghdr& message) noexcept {
   return family == AF_INET || family == AF_INET6;
 }
 
-// The port of this machine that a datagram comes from; 0: it comes from another one, which may have several
-// addresses and send from each by a port of its own.
+// The port of this machine that a datagram comes from. 0: it comes from another machine, which may have
+// several addresses and send from each by a port of its own.
 std::uint16_t port_on_this_machine(const msghdr& message) noexcept {
   if (message.msg_namelen < sizeof(sockaddr_in)) return 0;
   const auto& from = *static_cast<const sockaddr_in*>(message.msg_name);

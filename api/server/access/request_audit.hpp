@@ -20,8 +20,8 @@ namespace plchost {
 /// The changes by clients, in the audit log: each request that changes something and was not refused, with
 /// its answer. For each source of posts it has the events and how many posts were taken, at its first, then
 /// at most once in kPostPeriod. Requests and posts that were refused go into a log of their own, so that they
-/// never push out what was done: the first one of a client, then once in kRefusedPeriod how many. Control
-/// loop only.
+/// never push out what was done. That log has the first one of a client, then once in kRefusedPeriod how
+/// many. Control loop only.
 class RequestAudit {
  public:
   static constexpr Duration kPostPeriod = std::chrono::seconds(60);

@@ -62,7 +62,7 @@ class PostLedger {
   [[nodiscard]] static std::string file_name(std::string_view pool);
 
   /// The entry of that source. A source that is not known gets a free entry, or that of the source that
-  /// posted least recently: if it runs on, it starts anew at the base that its posts carry.
+  /// posted least recently. If that one runs on, it starts anew at the base that its posts carry.
   [[nodiscard]] LedgerEntry& entry_for(const dds::Guid& source, std::int64_t now_ns);
 
   /// The same, of a source that is known; null: it is not.

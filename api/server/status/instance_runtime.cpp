@@ -50,7 +50,9 @@ std::string problem_of_instance(const InstanceStatus& status, const InstanceRunt
   std::string problem(status.problem.view());
   if (runtime == nullptr || runtime->pid != status.pid) return problem;
   add(problem, runtime->retain_problem.view());
-  if (runtime->forces > 0) add(problem, fmt::format("{} values of variables are forced", runtime->forces));
+  if (runtime->forces > 0)
+    add(problem, runtime->forces == 1 ? "1 variable is forced"
+                                      : fmt::format("{} variables are forced", runtime->forces));
   return problem;
 }
 

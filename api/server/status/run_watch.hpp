@@ -17,7 +17,7 @@
 
 namespace plchost {
 
-/// Waits for the tasks that run for a post to come to the ends of their cycles: looks at the instances'
+/// Waits for the tasks that run for a post to come to the ends of their cycles. It looks at the instances'
 /// pages, so that neither the task nor the poster has anything to do for it. Control loop only.
 class RunWatch {
  public:

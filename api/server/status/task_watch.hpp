@@ -29,8 +29,8 @@ class TaskWatch {
   /// The statistics of each task are told so often, if it ran.
   static constexpr Duration kStatisticsPeriod = std::chrono::seconds(1);
   /// How many of them are read and written in one call of look(). Each costs up to 0.1 ms (3 digits, values
-  /// all over the range; typically a tenth of that): with a call every 10 ms at most a tenth of the core, and
-  /// 1,600 tasks a second. With more tasks each is told less often.
+  /// all over the range; typically a tenth of that). With a call every 10 ms that is at most a tenth of the
+  /// core, and 1,600 tasks a second. With more tasks each is told less often.
   static constexpr std::uint32_t kStatisticsPerLook = 16;
 
   TaskWatch(std::string pool, StatusTable<plc_TaskStatus>& table, StatisticsWriter statistics)

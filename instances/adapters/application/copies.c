@@ -1,7 +1,7 @@
 /*
  * Copies of globals. A program that has some works on them, and no other task changes them in the middle of
- * its cycle. They are exchanged with the globals before and behind its code: of all programs with copies one
- * at a time, so that another one takes all that one of them has put, or nothing of it. A task waits for the
+ * its cycle. They are exchanged with the globals before and behind its code, of all programs with copies one
+ * at a time. So another one takes all that one of them has put, or nothing of it. A task waits for the
  * copying of another one only, which has its priority meanwhile.
  */
 #include <pthread.h>

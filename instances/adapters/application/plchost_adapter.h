@@ -1,8 +1,8 @@
 /*
- * Between the files of an application that a compiler for IEC 61131-3 has translated: the one that `plcctl
- * build application` writes, in C or C++, in which the program and its types are, and those that know the
- * runtime: application.c, copies.c, places.c, symbols.c and variables.c. All names are in lower case: those
- * of the program are in upper case, so none of them can be the same.
+ * Between the files of an application that a compiler for IEC 61131-3 has translated. One file has the
+ * program and its types: `plcctl build application` writes it, in C or C++. The others know the runtime:
+ * application.c, copies.c, places.c, symbols.c and variables.c. All names are in lower case: those of the
+ * program are in upper case, so none of them can be the same.
  */
 #ifndef PLCHOST_ADAPTER_H
 #define PLCHOST_ADAPTER_H

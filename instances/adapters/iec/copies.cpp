@@ -34,9 +34,15 @@ class CopyCollector {
       const std::string value = within + (variable.member.empty() ? folded(variable.name) : variable.member);
       if (variable.section == Section::external) {
         add(variable, value);
-      } else if (variable.section == Section::input || variable.section == Section::output ||
-                 variable.section == Section::local || is_call(variable)) {
-        if (const Pou* const block = project_.pou(variable.type)) visit(*block, value + ".", depth + 1);
+        continue;
+      }
+      const Pou* const block = project_.pou(variable.type);
+      if (block == nullptr) continue;
+      if (variable.section == Section::input || variable.section == Section::output ||
+          variable.section == Section::local || is_call(variable)) {
+        visit(*block, value + ".", depth + 1);
+      } else if (variable.section != Section::in_out) {  // that is one of these, or a global
+        leave_out_of(*block);
       }
     }
   }
@@ -48,8 +54,10 @@ class CopyCollector {
     const auto global = plan_.globals.find(name);
     if (global != plan_.globals.end() && global->second->constant) return;
     if (global == plan_.globals.end()) return leave_out(external, name, "it is not found among the globals");
-    if (!is_data(project_, global->second->type))
+    if (!is_data(project_, global->second->type)) {
+      if (const Pou* const block = project_.pou(global->second->type)) leave_out_of(*block);
       return leave_out(external, name, "it is a function block, or has references");
+    }
     if (compiler_ == Compiler::strucpp && external.member.empty())
       return leave_out(external, name, "a part of the program uses it without VAR_EXTERNAL");
     auto found = std::ranges::find(found_.all, name, &CopiedGlobal::name);
@@ -60,6 +68,18 @@ class CopyCollector {
                                         .dimensions = dimensions_of(global->second->type, 0)});
     }
     found->externals.push_back(value);
+  }
+  // Of a block that is not in the memory of the program: its VAR_EXTERNAL remain the globals.
+  void leave_out_of(const Pou& block) {
+    if (!outside_.insert(&block).second) return;
+    for (const Variable& variable : block.variables) {
+      const std::string name = folded(variable.name);
+      const auto global = plan_.globals.find(name);
+      const bool constant = global != plan_.globals.end() && global->second->constant;
+      if (variable.section == Variable::Section::external && !constant)
+        leave_out(variable, name, fmt::format("{} uses it, and is global or temporary", block.name));
+      if (const Pou* const inner = project_.pou(variable.type)) leave_out_of(*inner);
+    }
   }
   void leave_out(const Variable& external, const std::string& name, std::string_view why) {
     if (!left_out_.insert(name).second) return;
@@ -90,6 +110,7 @@ class CopyCollector {
   const Program& program_;
   Compiler compiler_;
   std::set<std::string> left_out_;
+  std::set<const Pou*> outside_;
   ProgramCopies found_;
 };
 

@@ -146,7 +146,7 @@ class ProjectReader {
         begin.retain = true;
       } else if (take("CONSTANT")) {
         begin.constant = true;
-      } else if (at("PERSISTENT")) {
+      } else if (at("PERSISTENT") && !is_declared_here()) {
         project_.persistent.push_back(take().place);
       } else if (!take("NON_RETAIN")) {
         break;
@@ -154,6 +154,12 @@ class ProjectReader {
     }
     if (section == Variable::Section::other) return skip_past("END_VAR");
     while (!at_end() && !take("END_VAR")) read_declaration(begin, variables);
+  }
+
+  // IEC 61131-3 does not reserve each word that a section can have: it may be the name of a variable.
+  [[nodiscard]] bool is_declared_here() const noexcept {
+    const Token& behind = at_end() ? token() : tokens_[next_ + 1];
+    return behind.is(":") || behind.is(",") || behind.is("AT");
   }
 
   // a, b AT %IX0.0 : ARRAY [1..3] OF INT := [1, 2, 3];

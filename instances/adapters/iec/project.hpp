@@ -14,7 +14,7 @@
 
 namespace plchost::iec {
 
-/// Types within types and function blocks within function blocks, in levels: what lies deeper is not looked at.
+/// Types within types and function blocks within function blocks, in levels. Deeper levels are not looked at.
 inline constexpr std::size_t kMostNested = 32;
 
 // The declarations in the sources of a program, as far as tasks, areas and variables need them. The compiler

@@ -108,6 +108,8 @@ class PouReader {
                 {"transitions", [&](const xml_node& one) { refuse_parts(one, "transition"); }}});
     text_.add(fmt::format("{} {}{}", kind->begin, name, return_type(pou, interface)), file_.line_of(pou));
     add_sections(interface);
+    // MATIEC takes no POU without a variable.
+    if (!has_variable(interface)) text_.add("VAR plchost_no_variable : BOOL; END_VAR", file_.line_of(pou));
     if (bodies.size() == 1) {
       add_body(bodies.front(), name);
     } else {
@@ -138,6 +140,12 @@ class PouReader {
     if (type && !is_function_) refuse(type, "only a function has a returnType");
     if (!type && is_function_) refuse(pou, "a function has a returnType");
     return type ? " : " + type_in(file_, type, where_) : "";
+  }
+  [[nodiscard]] bool has_variable(const xml_node& interface) const {
+    return std::ranges::any_of(interface.children(), [&](const xml_node& section) {
+      return std::ranges::any_of(section.children(),
+                                 [&](const xml_node& child) { return file_.name_of(child) == "variable"; });
+    });
   }
   void add_sections(const xml_node& interface) {
     const auto section = [&](std::string_view keyword) {

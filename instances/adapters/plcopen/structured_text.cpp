@@ -90,7 +90,7 @@ void ProjectSources::add_events(iec::Configuration& configuration) const {
         if (iec::folded(resource.name) != iec::folded(one.resource)) continue;
         const auto task = std::ranges::find(resource.tasks, iec::folded(one.task),
                                             [](const iec::Task& known) { return iec::folded(known.name); });
-        if (task == resource.tasks.end() || task->extension.place.line != 0) continue;
+        if (task == resource.tasks.end() || !task->extension.external_event.empty()) continue;
         task->extension.external_event = one.event;
       }
     }

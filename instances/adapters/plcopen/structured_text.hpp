@@ -33,7 +33,7 @@ class ProjectSources {
  public:
   /// Its ST, under the same name. All problems in it come to `problems`.
   [[nodiscard]] iec::Source take(const iec::Source& xml, iec::SourceProblems& problems);
-  /// The external events of tasks come to those that have no task file.
+  /// The external events of tasks come to those to which a task file gives none.
   void add_events(iec::Configuration& configuration) const;
   /// Problems and remarks of the ST get their places in the XML. The remarks of all XML come to the others.
   void restore(iec::SourceProblems& problems, iec::SourceProblems& remarks) const;

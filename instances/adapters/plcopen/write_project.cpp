@@ -222,8 +222,10 @@ class Writer {
     std::vector<Member> members = tree_of(instance.variables);
     std::map<std::string, std::string> types;  // of the programs, as they are written
     for (const ExportedProgram& program : instance.programs) {
-      const auto found = std::ranges::find(members, folded(program.name),
-                                           [](const Member& member) { return folded(member.name); });
+      const auto found = std::ranges::find_if(members, [&](const Member& member) {
+        return member.variable == nullptr && member.bounds.empty() &&
+               folded(member.name) == folded(program.name);
+      });
       types[program.name] =
           declared_.pou(program.type, found == members.end() ? std::vector<Member>() : found->members);
       if (found != members.end()) members.erase(found);

@@ -74,8 +74,9 @@ class Value {
     return value_.get<std::string>();
   }
   /// Of these letters only.
-  [[nodiscard]] std::string text_of(std::string_view letters, std::string_view allowed) const {
-    std::string text = this->text(kMostName);
+  [[nodiscard]] std::string text_of(std::string_view letters, std::string_view allowed,
+                                    std::size_t most = kMostName) const {
+    std::string text = this->text(most);
     if (text.find_first_not_of(letters) != std::string::npos) refuse(allowed);
     return text;
   }
@@ -187,7 +188,7 @@ class Reader {
   /// Names with dots between them, and "[]" behind them.
   static std::string path(const Value& value) {
     constexpr std::string_view kAllowed = "names with dots between them and [] behind them";
-    std::string text = value.text_of(std::string(kLetters) + ".[]", kAllowed);
+    std::string text = value.text_of(std::string(kLetters) + ".[]", kAllowed, kMostText);
     char before = '.';
     for (const char c : text) {
       const bool follows = c == '.'   ? before != '.' && before != '['

@@ -1,6 +1,6 @@
 /*
- * Firmware in plain C89 that shares objects of the pool with other programs: a feeder that puts parts into a
- * tray of four places until somebody has taken as many as it was asked for.
+ * Firmware in plain C89 that shares objects of the pool with other programs. It is a feeder that puts parts
+ * into a tray of four places until somebody has taken as many as it was asked for.
  *
  *     feeder POOL PARTS
  */

@@ -15,8 +15,8 @@
 
 namespace plchost {
 
-// The steps that a start, its trial and an online change have in common: the settings, what stands ready
-// before the application is loaded, its declaration, and the commit of that.
+// The steps that a start, its trial and an online change have in common. They are the settings, what stands
+// ready before the application is loaded, its declaration, and the commit of that.
 
 /// The settings and the device description of a start.
 struct StartSettings {

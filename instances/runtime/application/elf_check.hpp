@@ -18,7 +18,7 @@ inline constexpr std::size_t kMaxProgramFile = std::size_t{256} << 20;
                                      std::span<const std::string_view> symbols);
 
 /// Checks that a file which check_elf() has passed can be in a process beside another version of itself, and
-/// leave it again: it defines no symbol that exists once in a process. unsupported: the text names one.
+/// leave it again. It must define no symbol that exists once in a process. unsupported: the text names one.
 /// Set-up.
 [[nodiscard]] Result<void> check_elf_can_leave(std::span<const std::byte> file);
 

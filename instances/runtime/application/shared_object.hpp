@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// A loaded application or component. It stays loaded unless unload() is called: its code may be on a stack,
+/// A loaded application or component. It stays loaded unless unload() is called. Its code may be on a stack,
 /// its statics are destroyed when the process ends, and another program means a fresh process, or an online
 /// change.
 class SharedObject {

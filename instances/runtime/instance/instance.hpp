@@ -180,6 +180,7 @@ class Instance {
   [[nodiscard]] std::string hold_idle_states();
   void choose_scheduler();
   void report_tick();
+  void make_outputs_safe(const TaskSet::Fault& fault);
   [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
   [[nodiscard]] Result<void> restore_operator_events();
   void keep_settings();

@@ -8,6 +8,7 @@
 #include "instances/runtime/instance/instance.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/exception_history.hpp"
+#include "shm/plc_process_image.h"
 
 namespace plchost {
 
@@ -28,13 +29,23 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
 
 void Instance::serve_faults() {
   while (const auto fault = tasks_->take_fault()) {
+    make_outputs_safe(*fault);
     const std::string reason = keep_fault(*fault);
     if (fault->whole_application) {
       enter_exception(reason);
     } else {
-      host_->areas().outputs().task_fails(fault->task);
       unbind(fault->task);  // nobody runs what is posted to it any more
     }
+  }
+}
+
+// Before it is written down: the disk may not answer, and a task that was caught can hold a lock of the heap.
+void Instance::make_outputs_safe(const TaskSet::Fault& fault) {
+  SafeOutputs& outputs = host_->areas().outputs();
+  if (fault.whole_application) {
+    outputs.put_safe(PLC_IMAGE_STATE_EXCEPTION);
+  } else {
+    outputs.task_fails(fault.task);
   }
 }
 

@@ -71,7 +71,7 @@ class Planner {
                                  wanted.bytes, left, settings.size, wanted.flags));
     }
     if (settings.object.empty()) return {};
-    if (settings.safe != SafeState::keep && !wanted.is_output()) {
+    if (changes_outputs(settings.safe) && !wanted.is_output()) {
       return refused(settings, wanted.name,
                      "is no output, but the Object has a SafeState, which is for outputs");
     }

@@ -30,7 +30,7 @@ struct AreaPlan {
   std::vector<Place> places;  ///< of each declared area
 };
 
-/// Whether an area of these flags goes to a configured one of those: if it has bits of the user's, they and
+/// Whether an area of these flags goes to a configured one of those. If it has bits of the user's, they and
 /// nothing else must be among the other's; else all of its kinds. So an area with {attribute 'location' :=
 /// '16#8000'} passes 0x0EFF by and takes 0x8000.
 [[nodiscard]] bool flags_match(std::uint32_t declared, std::uint32_t configured) noexcept;

@@ -66,13 +66,24 @@ RetainImage retain_image(const std::string& application, std::span<const Declare
   return image;
 }
 
+// After an update of the host its kept images are those of the header before.
+Error not_this_memory(Error error, const DeclaredArea& first) {
+  if (error.code == ErrorCode::wrong_size && first.has_image()) {
+    error.message += fmt::format(
+        "; if Size is right, it is an image of a plc_process_image.h before version {}: remove it while no "
+        "program uses it, and compile its firmware anew",
+        PLC_IMAGE_VERSION);
+  }
+  return error;
+}
+
 Result<void> check_memory(const Areas::Environment& environment, const AreaSettings& settings,
                           const DeclaredArea& first) {
   if (settings.object.empty()) return AreaMemory::check_device(settings);
   if (environment.pool == nullptr) return {};
   const std::size_t bytes = bytes_in_pool(settings, first);
   const auto there = AreaMemory::check_pool(*environment.pool, settings.object, bytes);
-  if (!there) return failure_in(name_of(settings), there.error());
+  if (!there) return failure_in(name_of(settings), not_this_memory(there.error(), first));
   if (*there || environment.room == nullptr) return {};
   auto room = environment.room->take_memory(settings.object, bytes);
   return room ? room : failure_in(name_of(settings), std::move(room).error());
@@ -88,7 +99,7 @@ Result<void> check_retain(const Areas::Environment& environment, const RetainIma
   return room ? room : failure_in("retain variables", std::move(room).error());
 }
 
-// The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
+// The settings are checked by their texts. But a file has many: symbolic and hard links, and that of a memory
 // of the pool, one of which holds the retain areas.
 Result<void> check_distinct(const Areas::Environment& environment, const AreaPlan& plan,
                             std::span<const DeclaredArea> areas) {
@@ -245,7 +256,8 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
   } else {
     block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
     if (planned.settings == nullptr) return block.outputs->write(block.initial);
-    block.outputs->begin(block.initial, safe_values(*planned.settings));
+    const AreaSettings& settings = *planned.settings;
+    block.outputs->begin(block.initial, safe_values(settings), settings.safe != SafeState::unsaid);
   }
 }
 

@@ -17,7 +17,7 @@ plc_image image_in(std::span<std::byte> bytes, std::uint32_t size) noexcept {
 }
 
 // Killed at any instruction in here, readers have one of the two images, whole.
-void OutputImage::begin(std::span<const std::byte> initial, std::span<const std::byte> safe) {
+void OutputImage::begin(std::span<const std::byte> initial, std::span<const std::byte> safe, bool holds) {
   safe_.assign(safe.begin(), safe.end());
   shown_.assign(initial.begin(), initial.end());
   scratch_.resize(initial.size());
@@ -27,6 +27,7 @@ void OutputImage::begin(std::span<const std::byte> initial, std::span<const std:
     shown_ = scratch_;
   }
   plc_image_take(&image_, static_cast<plc_image_u64>(::getpid()));
+  plc_image_hold(&image_, holds ? 1 : 0);
   plc_image_set_safe(&image_, shown_.data());
   plc_image_tell(&image_, PLC_IMAGE_STATE_STOPPED, 1);
   __atomic_store_n(&image_.header->on_end, keeps() ? 0U : 1U, __ATOMIC_RELAXED);

@@ -14,11 +14,11 @@ namespace plchost {
 /// The image of shm/plc_process_image.h in memory of `bytes`, plc_image_bytes(size) of them.
 [[nodiscard]] plc_image image_in(std::span<std::byte> bytes, std::uint32_t size) noexcept;
 
-/// The image that several tasks of this process publish into, none of which waits for another: each makes a
-/// whole image of the latest one and its own bytes, and is too late if another one has published meanwhile;
-/// then it does it again. Tasks publish as they do, whatever readers are shown: begin() and put_safe() show
-/// them the safe image, and the first publication after arm() shows them the tasks' ones again. All functions
-/// are real-time, unless they say something else.
+/// The image that several tasks of this process publish into, none of which waits for another. Each makes a
+/// whole image of the latest one and its own bytes. If another one has published meanwhile, it is too late,
+/// and does it again. Tasks publish as they do, whatever readers are shown: begin() and put_safe() show them
+/// the safe image, and the first publication after arm() shows them the tasks' ones again. All functions are
+/// real-time, unless they say something else.
 class OutputImage {
  public:
   /// `memory` is an image already, and outlives this. Nobody else writes into it.
@@ -30,9 +30,9 @@ class OutputImage {
   [[nodiscard]] std::uint32_t size() const noexcept { return image_.size; }
 
   /// Takes the image over from the process before, whatever that has left. Readers are shown the safe image:
-  /// `safe`, or if that is empty, what they were shown before, and `initial` if that was nothing. Publishes
-  /// `initial`. Set-up, once.
-  void begin(std::span<const std::byte> initial, std::span<const std::byte> safe);
+  /// `safe`, or if that is empty, what they were shown before, and `initial` if that was nothing. `holds`: as
+  /// of plc_image_hold(). Publishes `initial`. Set-up, once.
+  void begin(std::span<const std::byte> initial, std::span<const std::byte> safe, bool holds);
   /// From now on readers are shown the safe image, or the last one that was published if they are to keep
   /// that. Later publications are not shown. Control thread.
   void put_safe(unsigned state) noexcept;

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// The two files of an instance's retain variables, DIRECTORY/INSTANCE.retain.0 and .1: each generation takes
+/// The two files of an instance's retain variables, DIRECTORY/INSTANCE.retain.0 and .1. Each generation takes
 /// the place of the one before the last, so whenever the power is cut one of them is whole.
 class RetainFiles {
  public:

@@ -9,14 +9,21 @@ namespace plchost {
 
 void SafeOutputs::make(std::vector<Block> blocks, std::size_t tasks) {
   blocks_ = std::move(blocks);
-  process_ = ::getpid();
+  process_.store(::getpid(), std::memory_order_relaxed);
   rests_.assign(tasks, true);
   fails_.assign(tasks, false);
 }
 
+// Each of its tasks alone: nobody drives it any more.
+bool SafeOutputs::has_failed(const Block& block) const noexcept {
+  return !block.writers.empty() &&
+         std::ranges::all_of(block.writers, [&](const Writer& one) { return fails_[one.task]; });
+}
+
 void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
   block.halted = state == PLC_IMAGE_STATE_HALTED;
-  const bool failed = failed_.load(std::memory_order_relaxed) && state != PLC_IMAGE_STATE_ENDED;
+  const bool failed =
+      (failed_.load(std::memory_order_relaxed) || has_failed(block)) && state != PLC_IMAGE_STATE_ENDED;
   if (block.image != nullptr) return block.image->put_safe(failed ? PLC_IMAGE_STATE_EXCEPTION : state);
   block.registers->put_safe();
   block.unsettled = true;
@@ -24,14 +31,14 @@ void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
 
 void SafeOutputs::put_safe(unsigned state) noexcept {
   armed_ = false;
-  if (state == PLC_IMAGE_STATE_ENDED) process_ = 0;
+  if (state == PLC_IMAGE_STATE_ENDED) process_.store(0, std::memory_order_relaxed);
   if (state == PLC_IMAGE_STATE_EXCEPTION) failed_.store(true, std::memory_order_relaxed);
   for (Block& block : blocks_) put_safe(block, state);
 }
 
 void SafeOutputs::fail() noexcept {
   // Not for a process that the application has forked, nor after the end.
-  if (::getpid() != process_) return;
+  if (::getpid() != process_.load(std::memory_order_relaxed)) return;
   failed_.store(true, std::memory_order_seq_cst);
   for (const Block& block : blocks_) {
     if (block.image != nullptr) {
@@ -79,7 +86,7 @@ void SafeOutputs::task_fails(std::size_t task) noexcept {
     const auto writer = std::ranges::find(block.writers, task, &Writer::task);
     if (writer == block.writers.end()) continue;
     writer->view->give_up();
-    if (block.writers.size() == 1) {
+    if (has_failed(block)) {
       put_safe(block, PLC_IMAGE_STATE_EXCEPTION);
     } else {
       settle(block, [](std::size_t) { return true; });

@@ -56,8 +56,9 @@ class SafeOutputs {
   /// Of an application of so many tasks. Set-up.
   void make(std::vector<Block> blocks, std::size_t tasks);
 
-  /// All outputs; `state` is one of PLC_IMAGE_STATE_..., for the dead-man word. After a fault it stays
-  /// PLC_IMAGE_STATE_EXCEPTION until the end. Control thread.
+  /// All outputs; `state` is one of PLC_IMAGE_STATE_..., for the dead-man word. After a fault, and after
+  /// those of all tasks that write the area, it stays PLC_IMAGE_STATE_EXCEPTION until the end. Control
+  /// thread.
   void put_safe(unsigned state) noexcept;
   /// A fault of the whole application: the part of put_safe() that a signal handler can do. Any context.
   void fail() noexcept;
@@ -79,6 +80,7 @@ class SafeOutputs {
   void put_safe(Block& block, unsigned state) noexcept;
   void hold(Block& block, const Writer& halted) noexcept;
   void go_on(Block& block) noexcept;
+  [[nodiscard]] bool has_failed(const Block& block) const noexcept;
   void settle(Block& block, const InCycle& in_cycle) noexcept;
 
   std::vector<Block> blocks_;
@@ -86,7 +88,7 @@ class SafeOutputs {
   std::vector<bool> fails_;  // by task
   bool armed_ = false;       // or driven
   std::atomic<bool> failed_{false};
-  pid_t process_ = 0;
+  std::atomic<pid_t> process_{0};  // a signal handler asks; 0: the end was told
 };
 
 }  // namespace plchost

@@ -74,7 +74,12 @@ enum class SafeState : std::uint8_t {
   keep,    ///< as they were put out last
   zero,    ///< all bytes 0
   values,  ///< given ones
+  unsaid,  ///< as keep, but terminals go by their age
 };
+/// Whether they are other ones then.
+[[nodiscard]] constexpr bool changes_outputs(SafeState safe) noexcept {
+  return safe == SafeState::zero || safe == SafeState::values;
+}
 
 /// [SysMem] Area.N: where application areas of these flags lie.
 struct AreaSettings {
@@ -84,7 +89,7 @@ struct AreaSettings {
   std::uint64_t size = 0;     ///< bytes
   std::string device;         ///< empty: `object` says where it is
   std::string object;         ///< a shared memory of the pool
-  SafeState safe = SafeState::keep;
+  SafeState safe = SafeState::unsaid;
   std::vector<std::byte> safe_values{};  ///< of SafeState::values: `size` bytes
   std::string where;                     ///< "line1.cfg:12", its first line
   bool operator==(const AreaSettings&) const = default;

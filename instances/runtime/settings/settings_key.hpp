@@ -20,7 +20,7 @@ struct AreaDraft {
   std::string where;  ///< its first line
   std::optional<std::int64_t> flags, address, size;
   std::string device, object;
-  SafeState safe = SafeState::keep;
+  SafeState safe = SafeState::unsaid;
   std::vector<std::byte> safe_values;
 };
 
@@ -38,7 +38,7 @@ struct SettingsTarget {
 [[nodiscard]] std::string in_folder(const SettingsTarget& target, std::string_view path);
 
 // The kinds of value of a key. Each has its range, where a value goes, and the default as it stands in the
-// program; null: there is none. setting_places.hpp makes both functions from a member of the settings.
+// program; null: there is none. Both functions are made by setting_places.hpp from a member of the settings.
 
 /// An integer, lowest to highest. A default outside of the range is none that could be written.
 struct NumberSetting {

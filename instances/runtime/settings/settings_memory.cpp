@@ -106,7 +106,7 @@ std::unexpected<Error> bad(std::size_t number, const AreaDraft& area, std::strin
 }
 
 Result<void> check_safe_state(std::size_t number, const AreaDraft& area) {
-  if (area.safe != SafeState::keep && (*area.flags & (PLC_AREA_OUTPUT | PLC_AREA_USER)) == 0) {
+  if (changes_outputs(area.safe) && (*area.flags & (PLC_AREA_OUTPUT | PLC_AREA_USER)) == 0) {
     return bad(
         number, area,
         fmt::format("has a SafeState, which is for outputs; its Flags {:#x} need 0x8, or bits of {:#x}",
@@ -188,7 +188,7 @@ constexpr std::array kMemoryKeys = {
     SettingKey{.section = kMemory,
                .name = "Area.N.SafeState",
                .prefixed = true,
-               .meaning = "outputs while no task drives them; without it Keep",
+               .meaning = "outputs while no task drives them; without it kept, and terminals go by age",
                .value = NumberedSetting{"Keep, Zero, or 0x and two hexadecimal digits for each of the Size "
                                         "bytes, at most 4096",
                                         set_safe_state, kLastArea}},

@@ -19,8 +19,8 @@ struct Options {
   bool save_retain = false;                  ///< only write the retain memory to its files
 };
 
-/// The result of the command line: options, or the exit code of a program that has nothing more to do (help,
-/// version, or a usage error, whose text is printed already).
+/// The result of the command line: options, or the exit code of a program that has nothing more to do. That
+/// is after help, version, or a usage error, whose text is printed already.
 struct ParsedOptions {
   std::optional<Options> options;
   int exit_code = 0;

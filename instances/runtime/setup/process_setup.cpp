@@ -27,7 +27,7 @@ bool has_capability(unsigned capability) {
   return (sets[CAP_TO_INDEX(capability)].effective & CAP_TO_MASK(capability)) != 0;
 }
 
-// With locked memory no page of ours is ever swapped or faulted in late. malloc shall then neither give
+// With locked memory no page of ours is ever swapped or faulted in late. Then malloc shall neither give
 // memory back (M_TRIM_THRESHOLD) nor map large blocks anew each time (M_MMAP_MAX): both would bring the
 // faults back.
 Result<void> lock_memory() {

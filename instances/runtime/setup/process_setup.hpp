@@ -23,8 +23,8 @@ struct RealTimeSetup {
 [[nodiscard]] RealTimeSetup set_up_real_time();
 
 /// The instance's name, taken for this process as long as it is there. It is locks on files that nobody else
-/// can hold: one in the run directory, into which only the manager's user can write, and one beside the pool,
-/// for instances without a run directory.
+/// can hold. One is in the run directory, into which only the manager's user can write, and one beside the
+/// pool, for instances without a run directory.
 struct NameClaim {
   NameClaim() = default;
   NameClaim(NameClaim&& other) noexcept = default;

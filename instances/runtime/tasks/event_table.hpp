@@ -67,9 +67,9 @@ class EventTable {
   /// The counter that a task bound to the own event waits on; counts the task. invalid_argument: not an own
   /// event.
   [[nodiscard]] Result<CountedEvent*> bind_task(std::string_view event);
-  /// Before a start: all counters that tasks are bound to are still theirs, and stay it until publish_bound()
-  /// (see ObjectPool: an event that is neither registered nor bound may lose its place). Posters notice
-  /// nothing. wrong_state: one is lost, and none is held.
+  /// Before a start: all counters that tasks are bound to are still theirs, and stay it until
+  /// publish_bound(). An event that is neither registered nor bound may lose its place (see ObjectPool).
+  /// Posters notice nothing. wrong_state: one is lost, and none is held.
   [[nodiscard]] Result<void> hold_bound();
   /// Tells posters whether the tasks run: bound, or not.
   void publish_bound(bool running);

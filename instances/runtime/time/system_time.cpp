@@ -33,7 +33,7 @@ std::unexpected<Error> bad(const TimeFunction& function, std::string_view what) 
 constexpr auto kWatched = std::chrono::milliseconds(10);
 constexpr auto kWatchedAtMost = std::chrono::seconds(1);
 
-/// One function under test. Each call lies between two stamps of CLOCK_MONOTONIC: however long the processor
+/// One function under test. Each call lies between two stamps of CLOCK_MONOTONIC. However long the processor
 /// was taken away, the time that passed from the first to the last value is known to lie between two bounds.
 class Watch {
  public:

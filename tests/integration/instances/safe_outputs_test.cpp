@@ -51,7 +51,8 @@ class SafeOutputsOf : public ::testing::TestWithParam<SafeCase> {
     stream.read(reinterpret_cast<char*>(&word), sizeof word);
     return word;
   }
-  void expect_driven(const OutputWords& words = kDriven) const {
+  void expect_driven() const { expect_driven(GetParam().driven()); }
+  void expect_driven(const OutputWords& words) const {
     EXPECT_TRUE(eventually([&] {
       return plc_image_state(&terminal) == PLC_IMAGE_STATE_RUNNING && shown() == words &&
              in_device() == 0x5555555555555555;
@@ -155,7 +156,7 @@ TEST_P(SafeOutputsOf, AnApplicationAreDrivenUnderEachScheduler) {
     const auto cycles = sut->task("Slow")->counters.cycles;
     ASSERT_TRUE(eventually([&] { return sut->task("Slow")->counters.cycles > cycles + 2; }));
     EXPECT_EQ(plc_image_state(&terminal), PLC_IMAGE_STATE_RUNNING);
-    EXPECT_EQ(shown(), kDriven);
+    EXPECT_EQ(shown(), GetParam().driven());
   }
 }
 
@@ -163,7 +164,7 @@ TEST_P(SafeOutputsOf, ATaskThatFailsAloneAreSafeAndOthersAreDriven) {
   start("[Task.Valve]\nWatchdog.Policy=Task\n");
   expect_driven();
   (void)sut->event("valve").post();
-  OutputWords expected = kDriven;
+  OutputWords expected = GetParam().driven();
   expected[2] = 0x33333333;
   expect_driven(expected);
   (void)sut->event("valve").post();
@@ -180,7 +181,7 @@ TEST_P(SafeOutputsOf, AKilledProcessAreToldByTheirAgesAndSafeInTheNextOne) {
   expect_driven();
   sut->end(SIGKILL);
   EXPECT_EQ(plc_image_state(&terminal), PLC_IMAGE_STATE_RUNNING);
-  EXPECT_EQ(shown(), kDriven);
+  EXPECT_EQ(shown(), GetParam().driven());
   EXPECT_TRUE(eventually([&] {
     return plc_image_age_ns(&terminal) > 500'000'000 && plc_image_heartbeat_age_ns(&terminal) > 500'000'000;
   }));

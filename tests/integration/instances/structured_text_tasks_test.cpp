@@ -110,8 +110,8 @@ END_RESOURCE END_CONFIGURATION
 // An online change compares the tasks that run with those of the new version, option by option.
 TEST_P(TextWithATaskFile, HasEachOptionOfItsTaskFile) {
   constexpr const char* kTwoTasks = R"(
-PROGRAM Counted VAR twice AT %QW1 : INT; END_VAR twice := 7; END_PROGRAM
-CONFIGURATION cell RESOURCE press ON PLC
+PROGRAM Counted VAR_EXTERNAL twice : INT; END_VAR twice := 7; END_PROGRAM
+CONFIGURATION cell VAR_GLOBAL twice AT %QW1 : INT; END_VAR RESOURCE press ON PLC
   TASK done (INTERVAL := T#3ms, PRIORITY := 2);
   TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
   PROGRAM one WITH done : Counted;
@@ -132,7 +132,7 @@ END_RESOURCE END_CONFIGURATION
   EXPECT_EQ(refused.code, ErrorCode::refused);
   for (const char* const option :
        {"start offset", "LatePolicy=Asap", "DrivesOutputs", "watchdog's time", "watchdog's sensitivity",
-        "watchdog's omitted cycles", "watchdog's Policy=Task", "product"})
+        "watchdog's omitted cycles", "watchdog's Policy=Task", "its kind is external"})
     EXPECT_THAT(refused.text, HasSubstr(option));
   start(so("other"), "cold");
   EXPECT_TRUE(eventually([&] { return sut->task("fast")->counters.cycles > 100; }));

@@ -29,8 +29,8 @@ inline std::uint64_t lost_while(Plant& plant, const std::string& instance,
 
 /// Whether `disturb` costs `instance` cycles. One round without a loss shows that it does not. A core stands
 /// still for other reasons, too: after a round with a loss follows a calm stretch of the same length. If each
-/// round loses cycles, and half of the calm stretches do, the losses are the machine's, unless it lost none
-/// in the calm before the first round: some disturbances last. Programs with a
+/// round loses cycles, and half of the calm stretches do, the losses are the machine's. If it lost none in
+/// the calm before the first round, they are not: some disturbances last. Programs with a
 /// sanitizer are too slow to tell: one round, and false.
 inline bool costs_cycles(Plant& plant, const std::string& instance,
                          const std::function<void(std::uint32_t round)>& disturb,

@@ -18,7 +18,6 @@
 namespace plchost {
 namespace {
 
-using plchost::testing::kDriven;
 using plchost::testing::OutputWords;
 using plchost::testing::SafeCase;
 using ::testing::HasSubstr;
@@ -46,8 +45,8 @@ class SafeOutputsUnderAManager : public ::testing::TestWithParam<SafeCase> {
     return read && plc_image_state(&terminal) == state && shown == words && in_device == registers;
   }
   void expect_driven() const {
-    EXPECT_TRUE(
-        Plant::eventually([&] { return shows(PLC_IMAGE_STATE_RUNNING, kDriven, 0x5555555555555555); }));
+    EXPECT_TRUE(Plant::eventually(
+        [&] { return shows(PLC_IMAGE_STATE_RUNNING, GetParam().driven(), 0x5555555555555555); }));
   }
   [[nodiscard]] bool shows_safe(unsigned state) const {
     return shows(state, GetParam().shown, GetParam().registers);
@@ -89,7 +88,7 @@ TEST_P(SafeOutputsUnderAManager, AreMadeSafeByTheNextManagerIfBothAreKilled) {
   expect_driven();
   plant.kill_manager();
   plant.kill_instances();
-  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, kDriven, 0x5555555555555555)) << "nobody can tell";
+  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, GetParam().driven(), 0x5555555555555555)) << "nobody can tell";
   EXPECT_TRUE(Plant::eventually([&] { return plc_image_heartbeat_age_ns(&terminal) > 300'000'000; }))
       << "but by its age";
   plant.clear_instances();
@@ -116,7 +115,7 @@ TEST_P(SafeOutputsUnderAManager, StayDrivenWhileOnlyTheManagerIsKilled) {
   plant.start_manager();
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::running)) << plant.log();
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
-  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, kDriven, 0x5555555555555555));
+  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, GetParam().driven(), 0x5555555555555555));
   kill_instance();
   expect_ended();
 }
@@ -129,7 +128,7 @@ TEST_P(SafeOutputsUnderAManager, FollowTheCommands) {
   expect_driven();
   EXPECT_EQ(plant.ask(ControlVerb::set_scheduler, "line1", "CmpScheduleTimer").code, ErrorCode::ok);
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
-  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, kDriven, 0x5555555555555555));
+  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, GetParam().driven(), 0x5555555555555555));
   EXPECT_EQ(plant.ask(ControlVerb::reset, "line1").code, ErrorCode::ok);
   EXPECT_TRUE(shows_safe(PLC_IMAGE_STATE_STOPPED)) << "of a fresh process, before its first cycle";
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::ok);
@@ -174,7 +173,7 @@ TEST_P(SafeOutputsUnderAManager, AStrangersPageIsNotFollowed) {
   ASSERT_EQ(::chown(page().c_str(), kStranger, kStranger), 0);
   kill_instance();
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::failed));
-  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, kDriven, 0x5555555555555555));
+  EXPECT_TRUE(shows(PLC_IMAGE_STATE_RUNNING, GetParam().driven(), 0x5555555555555555));
   EXPECT_THAT(plant.log(), HasSubstr("line1: its outputs stay as they are: "));
   EXPECT_THAT(plant.log(), HasSubstr("was put there by another program"));
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::ok) << "it takes the place of that page";

@@ -148,6 +148,26 @@ TEST(ModbusDevices, TheSafeStateOfAPlcIsNoSilence) {
   EXPECT_EQ(peer.holding(7), 8);
 }
 
+// A device whose PLC was stopped or killed was cleared before there were safe states, and still is.
+TEST(ModbusDevices, APlcThatNamesNoSafeStateIsSilentWhenItStops) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
+  for (const unsigned state : {PLC_IMAGE_STATE_STOPPED, PLC_IMAGE_STATE_ENDED}) {
+    plant.show_safe(PLC_IMAGE_STATE_UNTOLD, 99, false);
+    ASSERT_TRUE(eventually([&] {
+      plant.put_out(0, 99);
+      return peer.holding(7) == 99;
+    })) << sut.log();
+    plant.show_safe(state, 99, false);
+    EXPECT_TRUE(eventually([&] {
+      plant.beat();
+      return peer.holding(7) == 0;
+    })) << state;
+  }
+}
+
 TEST(ModbusDevices, ADeviceThatVanishesIsGoneAndComesBack) {
   Plant plant;
   const HeldPort port;

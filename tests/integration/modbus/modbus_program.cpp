@@ -79,9 +79,10 @@ void Plant::put_out(unsigned offset, std::uint16_t word) {
   plc_image_write(&outputs_, bytes.data());
 }
 
-void Plant::show_safe(unsigned state, std::uint16_t word) {
+void Plant::show_safe(unsigned state, std::uint16_t word, bool holds) {
   std::array<std::uint8_t, kSize> bytes{};
   std::memcpy(bytes.data(), &word, sizeof word);
+  plc_image_hold(&outputs_, holds ? 1 : 0);
   plc_image_set_safe(&outputs_, bytes.data());
   plc_image_tell(&outputs_, state, 1);
 }

@@ -39,7 +39,8 @@ class Plant {
   /// Puts out an image with this word, and zeros.
   void put_out(unsigned offset, std::uint16_t word);
   /// Tells this state of the PLC (PLC_IMAGE_STATE_...), and shows a safe image with this word at byte 0.
-  void show_safe(unsigned state, std::uint16_t word);
+  /// `holds`: its settings name a safe state.
+  void show_safe(unsigned state, std::uint16_t word, bool holds = true);
   /// A sign of the PLC.
   void beat() { plc_image_beat(&outputs_); }
 

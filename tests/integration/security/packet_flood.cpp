@@ -1,4 +1,4 @@
-// packet_flood DOMAIN COUNT [SEED]: looks at what clients send to a host of that domain for a second, then
+// packet_flood DOMAIN COUNT [SEED]: looks for a second at what clients send to a host of that domain. Then it
 // sends COUNT packets made of it to that host, as fast as it goes.
 #include <chrono>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// The access control plugin of the system with its checks of what the own process may do switched off: so a
+// The access control plugin of the system, with its checks of what the own process may do switched off. So a
 // client creates and announces whatever it likes, and only others can refuse it.
 // Not dds_security_api.h, which is no C++.
 struct ddsi_domaingv;

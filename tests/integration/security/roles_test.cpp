@@ -129,8 +129,9 @@ class RightsOfVariables : public SecuredHost {
     for (const char* const verb : {"write", "force"}) {
       const auto written = run(who, {verb, "variable", "line1", "Main.speed=5"});
       EXPECT_EQ(written.code, allowed ? 0 : 1) << who << written.errors;
-      if (!allowed)
+      if (!allowed) {
         EXPECT_THAT(written.errors, HasSubstr("this takes the role engineer ([host] write_variables")) << who;
+      }
     }
     const auto ended = run(who, {"unforce", "variable", "line1", "Main.speed"});
     EXPECT_EQ(ended.code, allowed ? 0 : 1) << who << ended.errors;

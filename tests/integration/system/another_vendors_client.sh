@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A client of another vendor (Fast DDS), generated from api/control.idl, does what plcctl does: sees the host and its
-# instances, starts one, posts events to it with acknowledgement, and reads its status.
+# A client of another vendor (Fast DDS), generated from api/control.idl, does what plcctl does. It sees the host and
+# its instances, starts one, posts events to it with acknowledgement, and reads its status.
 . "$(dirname "$0")/common.sh"
 
 write_host cell "$first_core"

@@ -30,7 +30,7 @@ is "$(jq -c '[.[] | [.name, .p50_us, .note]]' "$cell/text.json")" \
   fail "$(cat "$cell/text.json")"
 if [ -n "${PLCHOST_MATIEC:-}" ]; then
   text env -u PLCHOST_STRUCPP
-  is "$(jq -c '[.[] | select(.p50_us > 0 and .ratio_p50 > 0 and .samples > 100) | .name]' "$cell/text.json")" \
+  is "$(jq -c '[.[] | select(.p50_us > 0 and .ratio_p50 > 0 and .samples > 100) | .name] | sort' "$cell/text.json")" \
     '["structured_text/matiec/CmpSchedule/1ms","structured_text/matiec/CmpScheduleOneShot/1ms","structured_text/matiec/CmpScheduleTimer/1ms"]' ||
     fail "$(cat "$cell/text.json")"
 fi

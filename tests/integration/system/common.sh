@@ -92,8 +92,8 @@ lost_while() {
 
 # costs_no_cycle INSTANCE/TASK COMMAND...: `COMMAND... 1`, `COMMAND... 2` and so on, until the task has lost no cycle meanwhile.
 # A core stands still for other reasons, too: after a round with a loss follows a calm stretch of the same length. If each
-# round loses cycles, and half of the calm stretches do, the losses are the machine's, unless it lost none in the calm before
-# the first round: some disturbances last.
+# round loses cycles, and half of the calm stretches do, the losses are the machine's. If it lost none in the calm before the
+# first round, they are not: some disturbances last.
 costs_no_cycle() {
   local of=$1 round rounds=8 began took lost disturbed before calm_with_loss=0
   shift

@@ -38,7 +38,7 @@ file_has() { is "$(in_file "$1")" "$2" || fail "$1: $(in_file "$1") instead of $
 echo "- tasks, programs and variables of two instances"
 plcctl export plant line1 line2 >"$cell/plant.xml" || fail "not exported"
 file_has 'names(".//configuration") + ": " + names(".//resource")' "cell: line1 line2"
-file_has 'names(".//resource[@name=\"line1\"]/task", "interval") + " " + names(".//resource[@name=\"line1\"]/task")' "T#1ms Fast"
+file_has 'names(".//resource[@name=\"line1\"]/task", "interval") + " " + names(".//resource[@name=\"line1\"]/task")' "T#2ms T#20ms Fast Slow"
 file_has 'names(".//pou[@name=\"fast_type\"]//localVars/variable")' "count twice"
 file_has 'names(".//resource[@name=\"line1\"]/globalVars/variable")' "grid line"
 file_has 'names(".//dataType[@name=\"line_type\"]//variable")' "label setpoint stopped total"

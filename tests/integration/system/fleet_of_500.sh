@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Not part of the test run, because of what it takes: BIN and APPLICATIONS as for the stories, then the numbers of hosts and
-# of instances in all (default 8 and 500). Each host in a namespace of its own on one switch. `plcctl apply` runs all of them,
-# those of a host one after the other. 500 that start at once on two cores fail: the holder of the lock of their pool for
-# set-up calls does not get a core within 100 ms. Says what they cost.
+# Not part of the test run, because of what it takes. Arguments: BIN and APPLICATIONS as for the stories, then the numbers of
+# hosts and of instances in all (default 8 and 500). Each host in a namespace of its own on one switch. `plcctl apply` runs
+# all of them, those of a host one after the other. 500 that start at once on two cores fail: the holder of the lock of their
+# pool for set-up calls does not get a core within 100 ms. Says what they cost.
 . "$(dirname "$0")/fleet.sh"
 
 host_count=${1:-8} instance_count=${2:-500}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A change of the program on a line that runs: sent from an engineer's machine, taken over between two cycles with the
-# variables, refused where it does not fit, and kept for what comes after.
+# A change of the program on a line that runs. It is sent from an engineer's machine, taken over between two cycles
+# with the variables, refused where it does not fit, and kept for what comes after.
 . "$(dirname "$0")/common.sh"
 
 write_host cell1 "$first_core"

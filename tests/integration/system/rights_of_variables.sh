@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Who may read, write and force variables: engineers, until the host's configuration gives it to others. Each write and force is
-# in the audit log with its principal.
+# Engineers read, write and force variables, and other roles if the host's configuration says so. Each write and force is in the
+# audit log with its principal.
 . "$(dirname "$0")/common.sh"
 
 plant=$cell/plant
@@ -29,6 +29,13 @@ for who in panel anna; do
   refused "[host] read_variables" as "$who" list variables line1
   refused "[host] read_variables" as "$who" watch variables line1 line.setpoint --count 1
 done
+code=0
+as panel export plant >"$cell/plant.xml" 2>"$cell/export.log" || code=$?
+is "$code" 1 || fail "exit code $code of an export without the right to read variables"
+grep -q '<task name="' "$cell/plant.xml" || fail "the tasks are not exported: $(cat "$cell/export.log")"
+grep -q "line1: exported without its variables: .*'panel' is viewer; this takes the role engineer" "$cell/export.log" || fail "$(cat "$cell/export.log")"
+as otto export plant >"$cell/plant.xml" || fail "an engineer exports the plant"
+grep -q 'variable name="setpoint"' "$cell/plant.xml" || fail "an engineer exports variables"
 refused "'anna' is operator; this takes the role engineer ([host] write_variables of this host says so)" \
   as anna write variable line1 line.setpoint=22
 refused "[host] write_variables" as anna force variable line1 line.setpoint=22

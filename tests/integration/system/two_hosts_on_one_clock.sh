@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Two managers on one simulated PTP device that drifts: their cycles start together, the status tells how far they are apart,
+# Two managers on one simulated PTP device that drifts. Their cycles start together, the status tells how far they are apart,
 # and the device is set and taken from one of them.
 . "$(dirname "$0")/common.sh"
 

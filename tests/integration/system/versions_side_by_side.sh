@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Hosts and clients of three versions of the contract in one domain: the first one, today's, and one that is still to come,
-# with a topic, an operation, fields and a code more. The promises:
+# Hosts and clients of three versions of the contract in one domain. They are the first one, today's, and one that is still
+# to come, with a topic, an operation, fields and a code more. The promises:
 # * A client of any version sees, commands and posts to hosts of all versions with the topics and fields that both know.
 # * A host answers an operation that it does not know with code 10, without delay.
 # * The counts tell a client that a host does not have a topic; it does not wait. A client ignores a topic that it does not know.

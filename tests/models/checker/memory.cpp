@@ -62,7 +62,7 @@ std::size_t Memory::index_of(std::uintptr_t address, std::size_t size) {
   return used_++;
 }
 
-// The clock of a thread is odd between its steps, and even in one: a plain access between two steps is known
+// The clock of a thread is odd between its steps, and even in one. A plain access between two steps is known
 // to a thread that synchronises with the later one, not with the earlier one.
 std::size_t Memory::begin(unsigned thread, std::uintptr_t address, std::size_t size) {
   ThreadView& self = threads_[thread];

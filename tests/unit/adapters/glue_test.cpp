@@ -352,5 +352,28 @@ TEST_F(MatiecGlue, GivesAProgramCopiesOfItsGlobals) {
   EXPECT_THAT(texts(other.remarks), Contains(HasSubstr("use go and can pre-empt")));
 }
 
+// The program would see the copy, and the block the global.
+TEST_F(MatiecGlue, GivesNoCopyOfAGlobalThatABlockOutsideOfTheProgramUses) {
+  const std::string tasks = std::string(kFast) + "PROGRAM one WITH fast : Main;";
+  for (const char* const block : {"VAR_EXTERNAL part : Outer; END_VAR", "VAR_TEMP part : Outer; END_VAR"}) {
+    const Glue glue = write(
+        std::string("FUNCTION_BLOCK Inner VAR_EXTERNAL go : BOOL; most : INT; END_VAR END_FUNCTION_BLOCK "
+                    "FUNCTION_BLOCK Outer VAR inner : Inner; END_VAR END_FUNCTION_BLOCK "
+                    "PROGRAM Main VAR_EXTERNAL go : BOOL; more : INT; END_VAR ") +
+            block + " END_PROGRAM",
+        "VAR_GLOBAL go : BOOL; more : INT; part : Outer; END_VAR VAR_GLOBAL CONSTANT most : INT := 3; "
+        "END_VAR",
+        tasks, {}, "[program.one]\nglobals = 'copy'");
+    EXPECT_THAT(texts(glue.problems), IsEmpty()) << block;
+    EXPECT_THAT(glue.text, Not(HasSubstr("PRESS__ONE.GO"))) << block;
+    EXPECT_THAT(glue.text, HasSubstr("PRESS__ONE.MORE.value = &plchost_copy_0;")) << block;
+    EXPECT_THAT(
+        texts(glue.remarks),
+        Contains(HasSubstr("PROGRAM one has no copy of go: Inner uses it, and is global or temporary")))
+        << block;
+    EXPECT_THAT(texts(glue.remarks), Not(Contains(HasSubstr("no copy of most")))) << block;
+  }
+}
+
 }  // namespace
 }  // namespace plchost::matiec

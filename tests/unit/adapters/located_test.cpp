@@ -34,7 +34,7 @@ TEST(LocatedVariable, SaysWhatIsAllowed) {
 
 TEST(LocatedVariable, IsReadFromTheFileOfTheCompilerWhoseEndIsNone) {
   const auto found =
-      located_variables("__LOCATED_VAR(INT,__IW2,I,W,2)\n__LOCATED_VAR(BOOL,__QX0_1,Q,X,0,1)\nBOUND");
+      located_variables("__LOCATED_VAR(INT,__IW2,I,W,2)\nSTOP__LOCATED_VAR(BOOL,__QX0_1,Q,X,0,1)\nBOUND");
   ASSERT_THAT(found, SizeIs(2));
   EXPECT_EQ(found[0].type, "INT");
   EXPECT_EQ(found[0].location, "%IW2");

@@ -19,6 +19,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
+// MATIEC takes no POU without one.
+constexpr std::string_view kNoVariable = "VAR plchost_no_variable : BOOL; END_VAR\n";
 constexpr std::string_view kTasks =
     "<task name='fast' interval='T#20ms' priority='1'><pouInstance name='one' typeName='Main'/></task>";
 
@@ -154,8 +156,9 @@ TEST(PlcopenXml, HasFunctionsAndFunctionBlocks) {
   const std::string text = text_of(project(
       "<pous><pou name='F' pouType='function'><interface><returnType><INT/></returnType></interface>" + body +
       "</pou><pou name='B' pouType='functionBlock'><interface/>" + body + "</pou></pous>"));
-  EXPECT_THAT(text,
-              HasSubstr("FUNCTION F : INT\n;\nEND_FUNCTION\nFUNCTION_BLOCK B\n;\nEND_FUNCTION_BLOCK\n"));
+  EXPECT_THAT(text, HasSubstr("FUNCTION F : INT\n" + std::string(kNoVariable) +
+                              ";\nEND_FUNCTION\nFUNCTION_BLOCK B\n" + std::string(kNoVariable) +
+                              ";\nEND_FUNCTION_BLOCK\n"));
 }
 
 // The configuration of CODESYS, as it exports it.
@@ -181,7 +184,8 @@ y := 2;
 <ObjectId>1</ObjectId></data></addData></pou></data></addData>
 </resource></configuration></configurations></instances></project>)";
   const std::string text = text_of(xml);
-  EXPECT_THAT(text, HasSubstr("PROGRAM PLC_PRG\nx := 1;\ny := 2;\n\nEND_PROGRAM\n"));
+  EXPECT_THAT(
+      text, HasSubstr("PROGRAM PLC_PRG\n" + std::string(kNoVariable) + "x := 1;\ny := 2;\n\nEND_PROGRAM\n"));
   EXPECT_THAT(text,
               HasSubstr("VAR_GLOBAL CONSTANT\na : INT;\nEND_VAR\nVAR_GLOBAL RETAIN\nb : INT;\nEND_VAR\n"));
   EXPECT_THAT(text, HasSubstr("TASK MainTask (INTERVAL := T#50ms, PRIORITY := 4);\n"

@@ -129,6 +129,19 @@ TEST(IecProject, NamesTwoPousOfOneName) {
               ElementsAre("a.st:2:1: there are two POUs 'A'"));
 }
 
+TEST(IecProject, KnowsPersistentFromAVariableOfThatName) {
+  const auto [project, problems] = read(
+      "PROGRAM p VAR RETAIN PERSISTENT a : INT; END_VAR VAR persistent : INT; END_VAR "
+      "VAR persistent, b : INT; END_VAR VAR persistent AT %QW1 : INT; END_VAR END_PROGRAM");
+  EXPECT_THAT(problems, IsEmpty());
+  EXPECT_THAT(project.persistent, SizeIs(1));
+  const std::vector<Variable>& variables = project.pou("p")->variables;
+  ASSERT_THAT(variables, SizeIs(5));
+  EXPECT_TRUE(variables[0].retain);
+  EXPECT_EQ(variables[1].name + variables[2].name + variables[3].name, "persistentpersistentb");
+  EXPECT_EQ(variables[4].location, "%QW1");
+}
+
 // Each cut of a text, and each word left out: it comes to an end, and says nothing of a place outside.
 TEST(IecProject, ComesToAnEndWithAnyText) {
   for (std::size_t length = 0; length <= kLine.size(); ++length) {
@@ -139,7 +152,8 @@ TEST(IecProject, ComesToAnEndWithAnyText) {
   }
   for (const char* const text :
        {"CONFIGURATION", "CONFIGURATION c RESOURCE", "PROGRAM p VAR a : ; b", "VAR", "PROGRAM p VAR : : AT ,",
-        "CONFIGURATION c TASK (", "CONFIGURATION c ) ( END_RESOURCE", "%", "{", "'", "T#"}) {
+        "CONFIGURATION c TASK (", "PROGRAM p VAR PERSISTENT", "CONFIGURATION c ) ( END_RESOURCE", "%", "{",
+        "'", "T#"}) {
     (void)read(text);
   }
 }

@@ -230,6 +230,18 @@ TEST(StrucppSymbols, OfArraysAreOneWithItsDimensions) {
                               "{{-1, 3u}, {0, 4u}, {1, 2u}, }}"));
 }
 
+// Members within members have long names. The program is built all the same.
+TEST(StrucppSymbols, WithALongNameAreTold) {
+  Parts parts;
+  const std::string member(600, 'M');
+  parts.symbols = symbol("ONE.RAW." + member, "INT", "g_config.ONE.RAW." + member) + "," +
+                  symbol("ONE.TOTAL", "DINT", "g_config.ONE.TOTAL");
+  const iec::Glue glue = glue_of(parts);
+  EXPECT_THAT(glue.text, HasSubstr("{\"one.TOTAL\", "));
+  EXPECT_THAT(glue.text, Not(HasSubstr(member)));
+  EXPECT_THAT(texts(glue.remarks), Contains(HasSubstr("its name has more than 250 characters")));
+}
+
 TEST(StrucppSymbols, ThatCannotBeSeenAreTold) {
   Parts parts;
   parts.symbols = symbol("ONE.TOTAL", "WSTRING", "g_config.ONE.TOTAL") + "," +

@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/base/names.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/plc_process_image.h"
 #include "tests/support/own_name.hpp"
@@ -141,6 +142,17 @@ TEST_F(OutputsPageOf, HasABound) {
   std::vector<LeftOutputs> more = most;
   more.push_back(most.front());
   EXPECT_FALSE(OutputsPage::create(pool, "line1", more));
+}
+
+// Its beginning is the name of another file.
+TEST_F(OutputsPageOf, RefusesADeviceWhosePathItCannotHold) {
+  std::vector<LeftOutputs> left = outputs();
+  left.back().device = "/" + std::string(kMaxPath - 1, 'd');
+  EXPECT_TRUE(OutputsPage::create(pool, "line1", left));
+  left.back().device += "d";
+  const auto refused = OutputsPage::create(pool, "line1", left);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("has 256 bytes, 255 are allowed"), std::string::npos);
 }
 
 }  // namespace

@@ -158,8 +158,8 @@ TEST_F(RetainFolder, WithBothSpoiledGivesNone) {
   EXPECT_THAT(found.problems, SizeIs(2));
 }
 
-// The states that a power cut may leave of a write: nothing of it, any part of the new file under its first
-// name, all of it there, or the new name.
+// The states that a power cut may leave of a write. They are nothing of it, any part of the new file under
+// its first name, all of it there, or the new name.
 TEST_F(RetainFolder, LeftInTheMiddleOfAWriteGivesOneOfTheLastTwo) {
   RetainFiles sut = open();
   ASSERT_TRUE(sut.write(image(1)));

@@ -29,6 +29,7 @@ using ::testing::HasSubstr;
 TEST(SafeStateSetting, IsAWordInAnyCaseOrTheBytesInOrder) {
   EXPECT_EQ(parse_settings(area_with("Keep"), "l.cfg")->areas[0].safe, SafeState::keep);
   EXPECT_EQ(parse_settings(area_with("zERO"), "l.cfg")->areas[0].safe, SafeState::zero);
+  EXPECT_EQ(parse_settings(area_with(""), "l.cfg")->areas[0].safe, SafeState::unsaid);
   const auto given = parse_settings(area_with("0x01fFa0", "3"), "l.cfg");
   ASSERT_TRUE(given) << given.error().describe();
   EXPECT_EQ(given->areas[0].safe, SafeState::values);
@@ -148,6 +149,39 @@ TEST_F(SafeOutputsOfAreas, TellTheSilenceByTheState) {
   EXPECT_EQ(plc_image_silence_ns(&*terminal), 0) << "ended";
 }
 
+// Settings that name no safe state leave it to the terminals, each of which has a limit of its own.
+TEST_F(SafeOutputsOfAreas, AreToldByTheirAgeIfTheSettingsNameNone) {
+  set_up("");
+  sut.outputs().arm();
+  run(0, 10);
+  for (const unsigned state :
+       {PLC_IMAGE_STATE_STOPPED, PLC_IMAGE_STATE_EXCEPTION, PLC_IMAGE_STATE_HALTED, PLC_IMAGE_STATE_ENDED}) {
+    sut.outputs().put_safe(state);
+    sut.outputs().beat([](std::size_t) { return false; });
+    EXPECT_EQ(shown(), (Words{10, 5, 12})) << "as if they were kept";
+    const plc_image_i64 age_ns = plc_image_age_ns(&*terminal);
+    EXPECT_GT(age_ns, 0);
+    EXPECT_GE(plc_image_silence_ns(&*terminal), age_ns) << state;
+  }
+}
+
+// A terminal would go on with the last image that it could read.
+TEST_F(SafeOutputsOfAreas, ThatAStrangerHasSpoiledAreSilence) {
+  set_up("Zero");
+  sut.outputs().beat([](std::size_t) { return false; });
+  ASSERT_EQ(plc_image_silence_ns(&*terminal), 0);
+  const std::uint64_t safe = terminal->header->safe;
+  for (const std::uint64_t spoiled : {std::uint64_t{0}, std::uint64_t{0x1ff}, safe + 0x100}) {
+    for (const bool ended : {false, true}) {
+      if (ended) plc_image_tell(&*terminal, PLC_IMAGE_STATE_ENDED, 1);
+      terminal->header->safe = spoiled;
+      EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER) << spoiled;
+      terminal->header->safe = safe;
+      EXPECT_EQ(plc_image_silence_ns(&*terminal), 0);
+    }
+  }
+}
+
 // Firmware that writes inputs tells nothing of itself, and shows what it writes.
 TEST_F(SafeOutputsOfAreas, AreNoneOfTheNextWriterThatTellsNoState) {
   set_up("Zero");
@@ -219,6 +253,22 @@ TEST_F(SafeOutputsOfAreas, AreThoseBytesThatATaskAloneWritesIfItFailsAlone) {
   EXPECT_EQ(shown(), (Words{40, 2, 42}));
 }
 
+TEST_F(SafeOutputsOfAreas, AreInExceptionWhenAllWhoWriteThemHaveFailedAlone) {
+  set_up("0x010000000200000003000000");
+  sut.outputs().arm();
+  run(0, 10);
+  run(1, 20);
+  sut.outputs().task_fails(1);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
+  sut.outputs().task_fails(0);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION);
+  EXPECT_EQ(shown(), (Words{1, 2, 3})) << "also the word that both of them change";
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_EXCEPTION) << "no start helps";
+  sut.end_outputs(true);
+  EXPECT_EQ(state(), PLC_IMAGE_STATE_ENDED);
+}
+
 TEST_F(SafeOutputsOfAreas, AreReachedWhenAllWhoWriteThemRest) {
   set_up("Zero");
   sut.outputs().arm();
@@ -241,7 +291,7 @@ TEST_F(SafeOutputsOfAreas, OfAProcessThatLeftItsImageHalfWrittenAreTakenOver) {
   ASSERT_EQ(shown(), (Words{10, 5, 12}));
   OutputImage next(std::span(reinterpret_cast<std::byte*>(terminal->header), terminal->mapped), 12);
   const Words initial{7, 7, 7};
-  next.begin(std::as_bytes(std::span(initial)), {});
+  next.begin(std::as_bytes(std::span(initial)), {}, true);
   EXPECT_EQ(state(), PLC_IMAGE_STATE_STOPPED);
   EXPECT_EQ(shown(), (Words{10, 5, 12})) << "kept until its first cycle";
   next.arm();
@@ -260,6 +310,18 @@ TEST_F(SafeOutputsOfAreas, AreRefusedInAnObjectOfOtherAreas) {
   ASSERT_FALSE(placed);
   EXPECT_THAT(placed.error().message, AllOf(HasSubstr("l.cfg:2: [SysMem] Area.0"), HasSubstr("area 'data'"),
                                             HasSubstr("is no output")));
+}
+
+TEST_F(SafeOutputsOfAreas, AreRefusedInAnImageOfTheHeaderBefore) {
+  task("Main", [] {});
+  declare("out", PLC_AREA_OUTPUT, 12);
+  const std::size_t before = plc_image_bytes(12) - PLC_IMAGE_SAFE_SLOTS * plc_image_stride(12);
+  ASSERT_TRUE(shared_.create_memory("io", before, {.keep = true}, {}));
+  const auto placed = place(area_with("Zero"));
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message,
+              AllOf(HasSubstr("l.cfg:2: [SysMem] Area.0"), HasSubstr("plc_process_image.h before version 2"),
+                    HasSubstr("remove it")));
 }
 
 TEST_F(SafeOutputsOfAreas, TellTheAgesOfTheLastImageAndOfTheProcess) {

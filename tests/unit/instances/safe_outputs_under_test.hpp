@@ -24,7 +24,7 @@ using Words = std::array<std::uint32_t, 3>;
 
 inline std::string area_with(const std::string& safe, const std::string& size = "12") {
   return "[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Object=io\nLinux.Area.0.Size=" + size +
-         "\nLinux.Area.0.SafeState=" + safe + "\n";
+         (safe.empty() ? "\n" : "\nLinux.Area.0.SafeState=" + safe + "\n");
 }
 
 /// An area of three words: one of each of two tasks, and one of neither.

@@ -72,8 +72,8 @@ TEST(DeclaredVariable, WhatIsNotAllowedIsRefused) {
   bad.pAddress = nullptr;
   EXPECT_EQ(refusal(bad), "variable 'Main.word': pAddress is null");
   bad = good;
-  bad.dwType = 26;
-  EXPECT_THAT(refusal(bad), HasSubstr("dwType 26 is not allowed: 1 to 25 is"));
+  bad.dwType = 28;
+  EXPECT_THAT(refusal(bad), HasSubstr("dwType 28 is not allowed: 1 to 27 is"));
   bad = good;
   bad.dwFlags = 2;
   EXPECT_THAT(refusal(bad), HasSubstr("dwFlags 0x2 are not allowed"));

@@ -49,9 +49,9 @@ class EachInstruction : public testing::Test {
     return found;
   }
 
-  /// A child that attaches, does `before` and `call`, and `call` again, in which it is killed: `steps`
-  /// instructions after the `write`-th time that it has written how much it had noted. False: it came to its
-  /// end.
+  /// A child that attaches, does `before` and `call`, and `call` again, in which it is killed. That is
+  /// `steps` instructions after the `write`-th time that it has written how much it had noted. False: it came
+  /// to its end.
   bool kill_within(const Work& before, const Work& call, int write, int steps) {
     std::array<int, 2> told{};
     EXPECT_EQ(::pipe(told.data()), 0);

@@ -149,7 +149,7 @@ TEST(SymbolTable, WrongSymbolsAreRefused) {
   symbol.bytes = kMaxVariableBytes + 1;
   EXPECT_TRUE(is_wrong(symbol));
   symbol = variable("a");
-  symbol.type = static_cast<VariableType>(26);
+  symbol.type = static_cast<VariableType>(28);
   EXPECT_TRUE(is_wrong(symbol));
   symbol = variable("a");
   symbol.task = std::string(51, 't');

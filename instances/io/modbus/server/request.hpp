@@ -7,8 +7,8 @@
 
 #include "instances/io/modbus/config/modbus_config.hpp"
 
-// The requests of a Modbus client, read without trust. libmodbus answers only those that pass here: its own
-// answer to a request of a wrong length or function sleeps for half a second.
+// The requests of a Modbus client, read without trust. Only those that pass here are answered by libmodbus:
+// its own answer to a request of a wrong length or function sleeps for half a second.
 
 namespace plchost::modbus {
 
