@@ -93,7 +93,7 @@ TEST_F(DebugPageInParts, IsHeldForABoundedTime) {
   int asked = 0;  // by a debugger that begins again and again
   while (asked < 1'000'000 && is_held()) ++asked;
   EXPECT_FALSE(is_held());
-  sut.write("0123456789");
+  sut.write("zyxwvutsrqponmlkjihgfedcba9876543210");
   EXPECT_TRUE(is_held());
 }
 
