@@ -310,7 +310,8 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   const auto segment = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
   const PoolView view(segment->bytes(), kRoom);
   // Processes with a sanitizer take long to begin; each instruction is met without one.
-  constexpr unsigned kRounds = kSanitized ? 100 : 500;
+  constexpr unsigned kRounds = kSanitized ? 50 : 500;
+  constexpr unsigned kSlower = kSanitized ? 10 : 1;
   // On a busy machine some of them die before they are clients.
   const auto enough = [&] { return view.header().departed.load() > kRounds; };
   for (unsigned round = 0; round < kRounds || (!enough() && round < 4 * kRounds); ++round) {
@@ -320,7 +321,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
       if (child == 0) storm(name_.get(), round * 31 + i);
       ++i;
     }
-    std::this_thread::sleep_for(std::chrono::microseconds(400 + 53 * (round % 61)));
+    std::this_thread::sleep_for(std::chrono::microseconds(kSlower * (400 + 53 * (round % 61))));
     for (const pid_t child : children) kill_and_reap(child);
     // Nothing is held by the dead, and each kept memory has its file and no other one has.
     std::size_t memories = 0;
