@@ -142,34 +142,37 @@ class TaskFileReader {
   }
 
   void read_tasks(const TomlValue& value, const Resource* resource) {
-    const TomlTable* const tasks = table(value, "task.NAME");
-    if (tasks == nullptr) return;
-    for (const auto& [name, one] : *tasks) {
-      if (problems_.size() >= kMostProblems) return;
-      const KnownTask* const task = find("task", tasks_, name, one, resource);
-      const TomlTable* const keys = table(one, "task.NAME");
-      if (task == nullptr || keys == nullptr) continue;
-      if (task->extension->place.line != 0) {
-        problem(one, fmt::format("the task {} is given in line {}, too; remove one of both", *task->name,
-                                 task->extension->place.line));
-        continue;
-      }
-      task->extension->place = {file_.file, one.line, one.column};
-      read_task(*task, *keys, one.line);
-    }
+    read_each("task", tasks_, value, resource,
+              [&](const KnownTask& task, const TomlTable& keys, const TomlValue& one) {
+                if (task.extension->place.line != 0) {
+                  return problem(one, fmt::format("the task {} is given in line {}, too; remove one of both",
+                                                  *task.name, task.extension->place.line));
+                }
+                task.extension->place = {file_.file, one.line, one.column};
+                read_task(task, keys, one.line);
+              });
   }
   void read_programs(const TomlValue& value, const Resource* resource) {
-    const TomlTable* const programs = table(value, "program.NAME");
-    if (programs == nullptr) return;
-    for (const auto& [name, one] : *programs) {
+    read_each("program", programs_, value, resource,
+              [&](const KnownProgram& program, const TomlTable& keys, const TomlValue& one) {
+                SectionReader reader(keys, one.line, fmt::format("program {}", *program.name), problems_);
+                reader.tell_columns();
+                *program.copies_globals = read_choice(reader, "globals", kGlobals) == 1;
+                reader.refuse_unknown_keys();
+              });
+  }
+  /// Calls `read` for each of the tables [KIND.NAME] whose name is known.
+  template <class Known, class Read>
+  void read_each(std::string_view kind, const std::vector<Known>& all, const TomlValue& value,
+                 const Resource* resource, const Read& read) {
+    const std::string form = fmt::format("{}.NAME", kind);
+    const TomlTable* const parts = table(value, form);
+    if (parts == nullptr) return;
+    for (const auto& [name, one] : *parts) {
       if (problems_.size() >= kMostProblems) return;
-      const KnownProgram* const program = find("program", programs_, name, one, resource);
-      const TomlTable* const keys = table(one, "program.NAME");
-      if (program == nullptr || keys == nullptr) continue;
-      SectionReader reader(*keys, one.line, fmt::format("program {}", *program->name), problems_);
-      reader.tell_columns();
-      *program->copies_globals = read_choice(reader, "globals", kGlobals) == 1;
-      reader.refuse_unknown_keys();
+      const Known* const known = find(kind, all, name, one, resource);
+      const TomlTable* const keys = table(one, form);
+      if (known != nullptr && keys != nullptr) read(*known, *keys, one);
     }
   }
   template <class Known>
