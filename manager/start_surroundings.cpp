@@ -45,6 +45,7 @@ Result<void> try_application(const std::string& plc_instance, const HostConfig& 
   launch.application = instance.application;
   launch.pool = host.pool;
   launch.state_directory = host.state_directory;
+  launch.no_debug = !host.allow_debug;
   PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(plc_instance, launch));
   trial.await_end();
   return trial.verdict();

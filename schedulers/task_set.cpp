@@ -169,6 +169,10 @@ std::optional<Duration> TaskSet::between_cycles(const std::function<void()>& act
   return MonotonicClock::now() - closed;
 }
 
+bool TaskSet::stands_still() const noexcept {
+  return std::ranges::any_of(tasks_, [](const auto& task) { return task->trap().seat().is_still(); });
+}
+
 std::vector<std::string_view> TaskSet::tasks_in_cycle() const {
   std::vector<std::string_view> names;
   for (const auto& task : tasks_) {

@@ -170,6 +170,9 @@ class TaskSet {
   /// takes longer than a period. For how long that was. Nothing: there was no such moment now, nothing was
   /// done and nobody had to wait; try again. `action` is short, and does nothing that waits.
   [[nodiscard]] std::optional<Duration> between_cycles(const std::function<void()>& action);
+  /// Some task stands still in the middle of a cycle: see Task::stand_still(). Within an action of
+  /// between_cycles().
+  [[nodiscard]] bool stands_still() const noexcept;
   /// Those that are within a cycle just now, or in their event variables.
   [[nodiscard]] std::vector<std::string_view> tasks_in_cycle() const;
 

@@ -81,7 +81,7 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 #define PLC_IMAGE_STATE_RUNNING 1u   /* a cycle has ended since the start */
 #define PLC_IMAGE_STATE_STOPPED 2u   /* or just started, or between single cycles */
 #define PLC_IMAGE_STATE_EXCEPTION 3u /* a fault or a watchdog */
-#define PLC_IMAGE_STATE_HALTED 4u    /* a debugger holds the tasks */
+#define PLC_IMAGE_STATE_HALTED 4u    /* a debugger halts a task that writes it */
 #define PLC_IMAGE_STATE_ENDED 5u     /* the process has ended, in order or not */
 
 /* An instance gives a sign every 100 ms. While its tasks rest it is silent when five in a row are missing. */

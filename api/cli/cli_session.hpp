@@ -95,6 +95,7 @@ void add_watch_verb(const Command& plcctl, CliSession& session);
 void add_variable_verbs(const Command& plcctl, CliSession& session);
 void add_plant_verbs(const Command& plcctl, CliSession& session);
 void add_verify_verb(const Command& plcctl, CliSession& session);
+void add_debug_verb(const Command& plcctl, CliSession& session);
 void add_build_verb(const Command& plcctl, CliSession& session);
 void add_export_verb(const Command& plcctl, CliSession& session, const std::string& version);
 void add_completion_verb(const Command& plcctl);

@@ -197,6 +197,7 @@ int main(int argc, char** argv) {
   plchost::add_security_verb(plcctl, session);
   plchost::add_plant_verbs(plcctl, session);
   plchost::add_verify_verb(plcctl, session);
+  plchost::add_debug_verb(plcctl, session);
   plchost::add_build_verb(plcctl, session);
   plchost::add_export_verb(plcctl, session, PLCHOST_VERSION);
   plchost::add_completion_verb(plcctl);

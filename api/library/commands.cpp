@@ -52,6 +52,10 @@ std::string_view argument_name(OperationArgument argument) {
       return "variable=value";
     case OperationArgument::variable_or_all:
       return "variable";
+    case OperationArgument::debug_command:
+      return "command";
+    case OperationArgument::debug_part:
+      return "session offset";
   }
   return "";
 }

@@ -323,6 +323,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   }
   if (checked->verb == ControlVerb::read_log) return read_log(client, request);
   if (checked->verb == ControlVerb::list_variables) return list_variables(client, request);
+  if (checked->verb == ControlVerb::read_debug) return read_debug(client, request);
   audit->handed_on(identity);
   if (checked->verb == ControlVerb::download_application) {
     return begin_download(client, identity, *std::move(checked));

@@ -11,6 +11,7 @@
 #include "api/dds/text.hpp"
 #include "api/dds/variable_page.hpp"
 #include "api/server/control_server_parts.hpp"
+#include "shm/pages/debug_page.hpp"
 
 namespace plchost {
 
@@ -72,6 +73,15 @@ void ControlServer::Parts::list_variables(const dds::Guid& client, const plc_Req
       {.client = client, .identity = identity, .instance = std::string(dds::text_of(request.instance))},
       variable_query_of(request.part), MonotonicClock::now());
   if (!begun) tell(client, identity, begun.error().code, begun.error().describe());
+}
+
+// Its argument was checked. The answer is short, so it needs no page of its own.
+void ControlServer::Parts::read_debug(const dds::Guid& client, const plc_Request& request) {
+  constexpr std::size_t kMost = 500;  // of Reply.text
+  const auto part = DebugPart::parse(dds::text_of(request.argument)).value_or(DebugPart{});
+  const auto text = read_debug_part(pool.name(), dds::text_of(request.instance), part, kMost);
+  tell(client, request.header.request_identity, text ? ErrorCode::ok : text.error().code,
+       text ? *text : text.error().describe());
 }
 
 void ControlServer::Parts::tell_variables(std::vector<VariableLister::Finished> finished) {

@@ -92,6 +92,7 @@ struct ControlServer::Parts {
   void list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request);
   void read_log(const dds::Guid& client, const plc_Request& request);
   void list_variables(const dds::Guid& client, const plc_Request& request);
+  void read_debug(const dds::Guid& client, const plc_Request& request);
   void tell_variables(std::vector<VariableLister::Finished> finished);
   template <class Page>
   void send_page(const dds::Guid& client, const plc_SampleIdentity& identity, Page& page);

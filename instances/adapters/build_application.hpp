@@ -20,6 +20,7 @@ struct BuildOrder {
   std::string matiec;  ///< folder of that compiler; empty: PLCHOST_MATIEC, PATH
   std::string strucpp = {};   ///< folder of that compiler; empty: PLCHOST_STRUCPP, PATH
   std::string adapters;       ///< folder of plc_app.h and of the adapters' files
+  bool debug = false;         ///< tasks can halt at each statement: see plc_debug.h
   std::string keep;           ///< folder in which the files between are left (see WorkFolder); empty: nowhere
   std::string check_program;  ///< plc-instance; empty: the application is not checked
   Duration translate_limit = std::chrono::seconds(120);  ///< of iec2c or STruC++, and of the check

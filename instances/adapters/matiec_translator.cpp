@@ -10,6 +10,7 @@
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/located.hpp"
+#include "instances/adapters/matiec/statements.hpp"
 #include "instances/adapters/translator.hpp"
 
 namespace plchost {
@@ -41,11 +42,11 @@ class MatiecTranslator : public Translator {
     words_ = *std::move(words);
     const matiec::JoinedSource joined(context_.sources);
     if (!context_.has(context_.folder().write(std::string(matiec::kJoinedFile), joined.text()))) return false;
-    return run(joined) && read_located();
+    return run(joined) && read_located() && (!context_.order.debug || instrument(joined));
   }
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
-    return matiec::write_glue(context_.project, configuration(), resource, located_);
+    return matiec::write_glue(context_.project, configuration(), resource, located_, pous_);
   }
 
   bool compile(const std::string& name, const std::string& glue, const std::filesystem::path& made) override {
@@ -85,11 +86,11 @@ class MatiecTranslator : public Translator {
 
   bool run(const matiec::JoinedSource& joined) {
     namespace fs = std::filesystem;
-    const auto end =
-        context_.run("iec2c",
-                     {fs::absolute(compiler_.program), "-f", "-p", "-l", "-I",
-                      fs::absolute(compiler_.library), "-T", ".", std::string(matiec::kJoinedFile)},
-                     context_.order.translate_limit);
+    std::vector<std::string> command{fs::absolute(compiler_.program), "-f", "-p", "-l"};
+    if (context_.order.debug) command.insert(command.end(), {"-O", "l"});
+    command.insert(command.end(),
+                   {"-I", fs::absolute(compiler_.library), "-T", ".", std::string(matiec::kJoinedFile)});
+    const auto end = context_.run("iec2c", command, context_.order.translate_limit);
     if (!end) return false;
     std::ranges::move(matiec::problems_of(end->output, joined, context_.project, compiler_.library),
                       std::back_inserter(context_.report.problems));
@@ -115,7 +116,22 @@ class MatiecTranslator : public Translator {
         fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
   }
 
+  bool instrument(const matiec::JoinedSource& joined) {
+    constexpr const char* kCode = "POUS.c";
+    const auto code = context_.folder().read(kCode);
+    if (!context_.has(code)) return false;
+    auto made = matiec::with_statements(*code, joined);
+    for (matiec::DebugPou& pou : made.pous) {
+      if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
+    }
+    pous_ = std::move(made.pous);
+    return context_.has(context_.folder().replace(kCode, made.text)) &&
+           context_.has(
+               context_.folder().write(std::string(matiec::kDebugFile), matiec::debug_header(pous_)));
+  }
+
   BuildContext& context_;
+  std::vector<matiec::DebugPou> pous_;  // of a debug build
   matiec::Compiler compiler_;
   std::vector<std::string> words_;
   std::vector<matiec::Located> located_;

@@ -103,6 +103,12 @@ Result<void> WorkFolder::write(const std::string& name, std::string_view text) c
   return write_new_file(path_ / name, text);
 }
 
+Result<void> WorkFolder::replace(const std::string& name, std::string_view text) const {
+  std::error_code error;
+  fs::remove(path_ / name, error);
+  return write(name, text);
+}
+
 Result<std::string> WorkFolder::read(const std::string& name) const {
   PLCHOST_TRY_ASSIGN(TextFile file, read_text_file(path_ / name, kMaxBetween));
   return std::move(file.text);

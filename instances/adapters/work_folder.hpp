@@ -25,6 +25,8 @@ class WorkFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   [[nodiscard]] Result<void> write(const std::string& name, std::string_view text) const;
+  /// In the place of a file that a compiler has written there.
+  [[nodiscard]] Result<void> replace(const std::string& name, std::string_view text) const;
   [[nodiscard]] Result<std::string> read(const std::string& name) const;
   /// A compiler may say nothing of a full disk. So this tries to write there.
   [[nodiscard]] Result<void> check_room() const;

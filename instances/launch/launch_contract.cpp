@@ -85,6 +85,7 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
   add("--pool", options.pool);
   if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
   if (!options.state_directory.empty()) add("--state-directory", options.state_directory);
+  if (options.no_debug) arguments.emplace_back("--no-debug");
   if (options.stopped) arguments.emplace_back("--stopped");
   if (options.start_kind != StartKind::first) add("--start-kind", std::string(to_string(options.start_kind)));
   if (options.report_fd >= 0) add("--report-fd", std::to_string(options.report_fd));

@@ -37,6 +37,7 @@ struct LaunchOptions {
   std::string pool = "plchost";  ///< --pool NAME
   std::string run_directory;     ///< --run-directory DIR; empty: no control socket (by hand)
   std::string state_directory;  ///< --state-directory DIR: for what outlives a power cut; empty: nothing does
+  bool no_debug = false;        ///< --no-debug: an application that is a debug build is refused
   bool stopped = false;         ///< --stopped: load the application, do not start it
   StartKind start_kind = StartKind::first;  ///< --start-kind first|warm|cold|after-fault
   int report_fd = -1;              ///< --report-fd N: where SetupReports go; -1: standard error, as text

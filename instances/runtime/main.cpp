@@ -52,11 +52,12 @@ Result<UniqueFd> start_heartbeat() {
 
 // Until a signal or a client asks for the end.
 Result<void> serve(Instance& instance, const UniqueFd& signals, const UniqueFd& heartbeat) {
-  std::array<pollfd, 5> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
+  std::array<pollfd, 6> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
                              {.fd = heartbeat.get(), .events = POLLIN, .revents = 0},
                              {.fd = instance.control_fd(), .events = POLLIN, .revents = 0},
                              {.fd = instance.fault_fd(), .events = POLLIN, .revents = 0},
-                             {.fd = instance.values_fd(), .events = POLLIN, .revents = 0}}};
+                             {.fd = instance.values_fd(), .events = POLLIN, .revents = 0},
+                             {.fd = instance.debug_fd(), .events = POLLIN, .revents = 0}}};
   while (!instance.ended()) {
     const auto soon = instance.wants_advance_in();
     const timespec timeout = to_timespec(soon.value_or(Duration::zero()));

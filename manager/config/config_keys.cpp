@@ -124,6 +124,12 @@ constexpr std::array kHostKeys = {
         {.name = "log_level",
          .when = new_server,
          .meaning = "the least level that manager, API server and instances log"}),
+    host<&HostConfig::allow_debug, TruthKey>(
+        {.name = "allow_debug",
+         .when = at_once,
+         .why = "by processes that are started from then on",
+         .meaning = "false: instances refuse applications that are debug builds, whose tasks an engineer can "
+                    "halt"}),
     host<&HostConfig::keep_pool, TruthKey>(
         {.name = "keep_pool",
          .when = at_once,

@@ -32,7 +32,8 @@ struct HostConfig {
   std::string read_variables = "engineer";   ///< the role that may, of a secured host
   std::string write_variables = "engineer";  ///< the same, also to force
   std::string log_level = "info";
-  bool keep_pool = false;  ///< leave the pool in place at the end, for firmware that has it mapped
+  bool allow_debug = true;  ///< instances may load applications that are debug builds
+  bool keep_pool = false;   ///< leave the pool in place at the end, for firmware that has it mapped
 };
 
 /// [dds]: how the API server is reached.

@@ -221,6 +221,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
   options.run_directory = surroundings_.host.run_directory;
   options.state_directory = surroundings_.host.state_directory;
   options.start_kind = start_kind_;
+  options.no_debug = !surroundings_.host.allow_debug;
   options.stopped = next == Next::stay_stopped;
   options.report_fd = kChildReportFd;
   options.log_level = surroundings_.host.log_level;

@@ -29,6 +29,22 @@ class CycleGate {
     void leave() noexcept { word_.store(kOutside, std::memory_order_release); }
     /// Any thread.
     [[nodiscard]] bool taken() const noexcept { return word_.load(std::memory_order_seq_cst) != kOutside; }
+    /// The code stands still in its middle, and the seat is empty until goes_on(). The seat's own thread,
+    /// while code runs. Since when the code runs.
+    [[nodiscard]] TimePoint stands_still() noexcept {
+      const TimePoint start{Duration(word_.load(std::memory_order_relaxed))};
+      still_.store(true, std::memory_order_relaxed);
+      word_.store(kOutside, std::memory_order_release);
+      return start;
+    }
+    /// Any thread that has found the seat empty, as long as the gate is closed.
+    [[nodiscard]] bool is_still() const noexcept { return still_.load(std::memory_order_relaxed); }
+    /// The code goes on, as if it had begun at `start`. Sleeps while the gate is closed. Null: there is none.
+    void goes_on(CycleGate* gate, Clock& clock, TimePoint start) noexcept {
+      if (gate != nullptr) enter(*gate, clock);
+      still_.store(false, std::memory_order_relaxed);
+      word_.store(start.time_since_epoch().count(), std::memory_order_release);
+    }
 
     /// Code of the application runs since `start`, or the runtime does work of its own, until part_ends().
     /// The seat's own thread, real-time.
@@ -41,8 +57,10 @@ class CycleGate {
       if (word <= kWithin) return std::nullopt;
       return TimePoint(Duration(word));
     }
-    /// The runtime does work of its own. Any thread.
-    [[nodiscard]] bool at_work() const noexcept { return word_.load(std::memory_order_acquire) == kAtWork; }
+    /// The runtime does work of its own, or the code stands still. Any thread.
+    [[nodiscard]] bool at_work() const noexcept {
+      return word_.load(std::memory_order_acquire) == kAtWork || still_.load(std::memory_order_relaxed);
+    }
 
    private:
     // Above kWithin: the time since which code of the application runs.
@@ -56,6 +74,7 @@ class CycleGate {
     }
 
     std::atomic<Duration::rep> word_{kOutside};
+    std::atomic<bool> still_{false};
     Duration::rep before_ = kOutside;  // the seat's own thread: the word outside of the part
   };
 

@@ -121,8 +121,8 @@ void FaultTrap::disarm() noexcept {
   seat_.part_ends();
 }
 
-bool FaultTrap::armed_here() noexcept {
-  return armed != nullptr;
+const FaultTrap* FaultTrap::here() noexcept {
+  return armed;
 }
 
 void FaultTrap::strike(TimePoint since, FaultKind kind, std::int64_t figure, std::int64_t limit) noexcept {

@@ -44,7 +44,9 @@ class FaultTrap {
   void disarm() noexcept;
 
   /// The calling thread runs code of a task. Any context.
-  [[nodiscard]] static bool armed_here() noexcept;
+  [[nodiscard]] static bool armed_here() noexcept { return here() != nullptr; }
+  /// The one under which the calling thread runs code of a task; null: it runs none. Any context.
+  [[nodiscard]] static const FaultTrap* here() noexcept;
   /// Since when the code runs that is running now. Any thread.
   [[nodiscard]] std::optional<TimePoint> running_since() const noexcept { return seat_.code_since(); }
   /// Where the thread says that it is in a cycle. Any thread.

@@ -10,7 +10,8 @@ namespace {
 
 template <class Policy>
 constexpr SchedulerEntry entry_of(const PolicyName<Policy>& policy) {
-  return {.name = policy.name, .make = &make_policy<Policy>};
+  return {
+      .name = policy.name, .make = &make_policy<Policy>, .halts_external_tasks = kHaltsExternalTasks<Policy>};
 }
 
 constexpr std::array kSchedulers =

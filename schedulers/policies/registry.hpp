@@ -28,6 +28,12 @@ inline constexpr std::tuple kPolicies{
     PolicyName<class CmpScheduleOneShot>{"CmpScheduleOneShot"},
 };
 
+/// Whether breakpoints in tasks of external events halt under this scheduler; else they are ignored.
+template <class Policy>
+inline constexpr bool kHaltsExternalTasks = false;
+template <>
+inline constexpr bool kHaltsExternalTasks<class CmpSchedule> = true;
+
 /// Their names, for programs that do not link the schedulers.
 inline constexpr std::array kSchedulerNames =
     std::apply([](const auto&... policy) { return std::array{policy.name...}; }, kPolicies);
@@ -36,6 +42,7 @@ inline constexpr std::array kSchedulerNames =
 struct SchedulerEntry {
   std::string_view name;
   std::unique_ptr<Scheduler> (*make)(const SchedulerContext&);
+  bool halts_external_tasks = false;  ///< see kHaltsExternalTasks
 };
 
 /// Makes a scheduler. The file of `Policy` instantiates it.

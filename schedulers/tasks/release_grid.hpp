@@ -38,6 +38,14 @@ class ReleaseGrid {
   [[nodiscard]] TimePoint next() const noexcept { return next_; }
   void shift(Duration by) noexcept { next_ += by; }
 
+  /// The releases before `until` are skipped; how many they are.
+  std::uint64_t pass_over(TimePoint until) noexcept {
+    if (until <= next_) return 0;
+    const auto passed = (until - next_ + interval_ - Duration(1)) / interval_;
+    next_ += passed * interval_;
+    return static_cast<std::uint64_t>(passed);
+  }
+
   /// `release`, which plan() gave, runs.
   void ran(TimePoint release) noexcept { next_ = release + interval_; }
 

@@ -94,11 +94,28 @@ void Task::run_cycle(const Activation& activation) noexcept {
   const TimePoint left = clock_.now();
   if (config_.after_entry) config_.after_entry();
   const TimePoint end = config_.after_entry ? clock_.now() : left;
+  const Duration still = std::exchange(stood_still_, Duration::zero());
   state_->cycle_ended(activation.release, end);
-  record(activation, start, end, std::exchange(ready_, end));
+  if (still > Duration::zero()) pass_over(end);
+  record(activation, start, end - still, std::exchange(ready_, end));
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());
-  look_at_overrun(left - entered);
+  look_at_overrun(left - entered - still);
   if (config_.between_cycles) work_between_cycles();
+}
+
+void Task::stand_still(const std::function<void()>& wait) noexcept {
+  const TimePoint from = clock_.now();
+  const TimePoint start = trap_.seat().stands_still();
+  wait();
+  const TimePoint to = clock_.now();
+  stood_still_ += to - from;
+  // Before the seat is taken: releases of that time are not omitted.
+  free_since_.store(to.time_since_epoch().count(), std::memory_order_relaxed);
+  trap_.seat().goes_on(gate_, clock_, start + (to - from));
+}
+
+void Task::pass_over(TimePoint end) noexcept {
+  passed_.store(passed_.load(std::memory_order_relaxed) + state_->pass_over(end), std::memory_order_relaxed);
 }
 
 void Task::work_between_cycles() noexcept {

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
 
 #include "schedulers/clock/clock.hpp"
@@ -61,6 +62,14 @@ class Task {
   /// Runs one cycle and records it. A C++ exception out of the application's code, or a cycle that the
   /// watchdog does not allow, raises fault(). The task's thread, real-time.
   void run_cycle(const Activation& activation) noexcept;
+  /// Calls `wait`, which comes back when the task is to go on: so long its code stands still in the middle of
+  /// a cycle. No watchdog counts that time, the task is in no cycle for between_cycles(), and the cycle's
+  /// execution time is without it. The task's thread, within its code.
+  void stand_still(const std::function<void()>& wait) noexcept;
+  /// The releases of cyclic tasks that passed in cycles that stood still: they are no lost ones. Any thread.
+  [[nodiscard]] std::uint64_t releases_passed() const noexcept {
+    return passed_.load(std::memory_order_relaxed);
+  }
   /// The next cycle is the first from another source. The task's thread.
   void source_changed() noexcept { overruns_.forgive_next(); }
 
@@ -123,6 +132,7 @@ class Task {
   void look_at_overrun(Duration execution) noexcept;
   void work_between_cycles() noexcept;
   void record(const Activation& activation, TimePoint start, TimePoint end, TimePoint ready) noexcept;
+  void pass_over(TimePoint end) noexcept;
 
   Clock& clock_;
   TaskConfig config_;
@@ -138,6 +148,8 @@ class Task {
   std::atomic<Duration::rep> free_since_{0};
   std::atomic<std::uint64_t> lost_{0};  // these two: one writer, the task's thread
   std::atomic<std::uint64_t> on_time_{0};
+  std::atomic<std::uint64_t> passed_{0};
+  Duration stood_still_{};  // in this cycle; the task's thread
 };
 
 }  // namespace plchost

@@ -32,6 +32,9 @@ class TaskKindState {
   /// The cycle for `release` came to its end.
   virtual void cycle_ended(TimePoint /*release*/, TimePoint /*end*/) noexcept {}
 
+  /// The releases up to `until` pass without being lost; how many they are.
+  virtual std::uint64_t pass_over(TimePoint /*until*/) noexcept { return 0; }
+
   /// The source of a task that runs when something happens; null: a scheduler says when it runs.
   /// `max_backlog` >= 1: the runs that the task may lag behind. Set-up.
   [[nodiscard]] virtual std::unique_ptr<ActivationSource> own_source(std::uint64_t /*max_backlog*/) {

@@ -34,7 +34,8 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
   const std::array beginnings = {instance_page_name(pool, ""),       instance_claim_name(pool, ""),
                                  transition_ring_name(pool, ""),     log_ring_name(pool, ""),
                                  fmt::format("{}.download.", pool),  fmt::format("{}.wish.", pool),
-                                 fmt::format("{}.variables.", pool), outputs_page_name(pool, "")};
+                                 fmt::format("{}.variables.", pool), outputs_page_name(pool, ""),
+                                 fmt::format("{}.debug.", pool)};
   const bool ours =
       std::ranges::find(names, file) != names.end() ||
       std::ranges::any_of(beginnings, [&](const auto& begin) { return file.starts_with(begin); });

@@ -16,6 +16,7 @@ struct Shared {
   int other_state = 0;
   std::atomic<std::uint32_t> nobody_wakes{0};
   bool looked = false;
+  bool half = false;  // plain, as state
   int seen = 0;
 };
 
@@ -126,6 +127,34 @@ void parts_of_a_cycle_seen(Scene& scene) {
   scene.outcomes(7);
 }
 
+// A debugger halts the task in the middle of its cycle: a look finds that, or a whole cycle, or none.
+void a_cycle_that_stands_still(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.thread("task", [&] {
+    const CycleGate::Stay within(&shared.gate, shared.seat, shared.clock);
+    shared.seat.code_begins(kStart);
+    shared.half = true;
+    const TimePoint start = shared.seat.stands_still();
+    require(start == kStart, "code stands still that has begun at another time");
+    shared.seat.goes_on(&shared.gate, shared.clock, start);
+    shared.half = false;
+    shared.seat.part_ends();
+  });
+  scene.thread("control", [&] {
+    shared.gate.close();
+    if (!shared.seat.taken()) {
+      require(shared.seat.is_still() == shared.half, "a look takes half a cycle for a whole one");
+      shared.seen = shared.half ? 2 : 1;
+    }
+    shared.gate.open(shared.clock);
+  });
+  scene.at_end([&] {
+    require(!shared.seat.taken(), "the seat is taken after the cycle");
+    observe(static_cast<unsigned>(shared.seen));
+  });
+  scene.outcomes(7);
+}
+
 }  // namespace
 }  // namespace plchost::models
 
@@ -136,5 +165,6 @@ int main(int argc, char** argv) {
               {"two_cycles_two_looks", two_cycles_two_looks},
               {"a_task_waits_at_the_gate", a_task_waits_at_the_gate},
               {"parts_of_a_cycle_one_look", parts_of_a_cycle_one_look},
-              {"parts_of_a_cycle_seen", parts_of_a_cycle_seen}});
+              {"parts_of_a_cycle_seen", parts_of_a_cycle_seen},
+              {"a_cycle_that_stands_still", a_cycle_that_stands_still}});
 }

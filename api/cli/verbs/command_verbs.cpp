@@ -89,6 +89,9 @@ void add(const Command& plcctl, CliSession& session, const Operation& operation)
       return add_with_argument(verb, session, operation, "VARIABLE");
     case OperationArgument::variable_value:
       return add_with_argument(verb, session, operation, "VARIABLE=VALUE");
+    case OperationArgument::debug_command:
+    case OperationArgument::debug_part:
+      return;  // "plcctl debug"
   }
 }
 

@@ -11,6 +11,9 @@
 
 PLC_EXPORT_ABI;
 
+/* Of a debug build; null: it is none. Returns 0 if that fails. */
+__attribute__((weak, visibility("hidden"))) int plchost_declare_debugging(void);
+
 static Task_Info* infos;
 
 /* The clock of IEC's timers: that of the cycle's begin, for each task its own. */
@@ -83,6 +86,7 @@ int CDECL plc_app_init(void) {
   if (infos == NULL || now == NULL || !plchost_prepare_copies()) return 1;
   plchost_bind();
   if (!plchost_declare_places() || !plchost_declare_variables() || !plchost_declare_symbols()) return 1;
+  if (plchost_declare_debugging != NULL && !plchost_declare_debugging()) return 1;
   for (i = 0; i < plchost_task_count; ++i) fill(&infos[i], &plchost_tasks[i]);
   setup.nTasks = (short)plchost_task_count;
   strncpy(setup.stApplicationName, plchost_application_name, sizeof setup.stApplicationName - 1);

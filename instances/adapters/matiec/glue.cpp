@@ -4,6 +4,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -26,8 +27,8 @@ std::string name_in_c(const iec::Resource& resource) {
 class Writer : public iec::GlueWriter {
  public:
   Writer(const iec::Project& project, const iec::Configuration& configuration, const iec::Resource& resource,
-         const std::vector<Located>& located)
-      : GlueWriter(project, configuration, resource, iec::Compiler::matiec), located_(located) {}
+         const std::vector<Located>& located, std::span<const DebugPou> pous)
+      : GlueWriter(project, configuration, resource, iec::Compiler::matiec), located_(located), pous_(pous) {}
 
  private:
   void write_head() override {
@@ -142,6 +143,21 @@ class Writer : public iec::GlueWriter {
         "  struct plchost_symbol s = {{0}};\n  (void)use;\n  (void)s;\n");
     for (const Symbol& symbol : symbols.all) write_symbol(symbol);
     print("}}\n");
+    if (!pous_.empty()) write_debugging(symbols);
+  }
+  // In a debug build: the POUs, and where their variables are.
+  void write_debugging(const Symbols& symbols) {
+    print("int plchost_declare_debugging(void) {{\n  int good = 1;\n");
+    for (std::size_t i = 0; i < pous_.size(); ++i)
+      print("  good = good && plc_debug_declare_pou(&plchost_pou_{}) == ERR_OK;\n", i);
+    for (const SymbolInstance& instance : symbols.instances) {
+      const auto pou =
+          std::ranges::find(pous_, instance.type, [](const DebugPou& known) { return folded(known.name); });
+      if (pou == pous_.end()) continue;
+      print("  good = good && plc_debug_declare_instance(&plchost_pou_{}, &{}, \"{}\") == ERR_OK;\n",
+            pou - pous_.begin(), instance.value, instance.path);
+    }
+    print("  return good;\n}}\n");
   }
   void write_symbol(const Symbol& symbol) {
     const auto text = [](const std::string& name) {
@@ -167,6 +183,7 @@ class Writer : public iec::GlueWriter {
   }
 
   const std::vector<Located>& located_;
+  std::span<const DebugPou> pous_;
   std::vector<const Located*> pointers_;                             // for each place
   std::map<Place, std::size_t> numbers_;                             // of places
   std::map<std::pair<Place, std::size_t>, std::string> own_values_;  // of inputs, by the number of the task
@@ -176,8 +193,9 @@ class Writer : public iec::GlueWriter {
 }  // namespace
 
 iec::Glue write_glue(const iec::Project& project, const iec::Configuration& configuration,
-                     const iec::Resource& resource, const std::vector<Located>& located) {
-  return Writer(project, configuration, resource, located).write();
+                     const iec::Resource& resource, const std::vector<Located>& located,
+                     std::span<const DebugPou> pous) {
+  return Writer(project, configuration, resource, located, pous).write();
 }
 
 }  // namespace plchost::matiec

@@ -171,6 +171,9 @@ class Collector {
 
   void add_all(const iec::Pou& pou, const Symbol& within, std::size_t depth) {
     if (depth > kMostNested) return;
+    found_.instances.push_back({.path = within.name.substr(0, within.name.size() - 1),
+                                .value = within.value.substr(0, within.value.size() - 1),
+                                .type = folded(pou.name)});
     for (const iec::Variable& variable : pou.variables) {
       using Section = iec::Variable::Section;
       const bool is_own = variable.section == Section::input || variable.section == Section::output ||

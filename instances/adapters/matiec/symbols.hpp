@@ -32,8 +32,16 @@ struct Symbol {
 /// has none.
 using ValueOfPlace = std::function<std::string(const iec::Place& place, std::optional<std::size_t> task)>;
 
+/// A program or function block with variables in it.
+struct SymbolInstance {
+  std::string path;   ///< that the names of its variables begin with: "MAIN.MOTOR"
+  std::string value;  ///< in C, for `&`
+  std::string type;   ///< name of its POU in upper case
+};
+
 struct Symbols {
   std::vector<Symbol> all;
+  std::vector<SymbolInstance> instances;
   iec::SourceProblems remarks;  ///< variables that are left out, and why
 };
 

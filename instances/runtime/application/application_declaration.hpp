@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/debug/declared_pou.hpp"
 #include "instances/runtime/memory/declared_area.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/variables/declared_variable.hpp"
@@ -40,6 +41,7 @@ struct ApplicationDeclaration {
   std::vector<EventCallback> callbacks;
   std::vector<DeclaredArea> areas;  ///< at the first load Areas gets them
   VariableCollection seen;          ///< variables that are seen from outside; VariableService gets them
+  PouCollection pous;               ///< of a debug build
 };
 
 }  // namespace plchost

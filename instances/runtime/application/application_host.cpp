@@ -173,6 +173,18 @@ RTS_RESULT ApplicationHost::declare_variable(const Plc_Variable* variable) {
   return ERR_NOTINITIALIZED;
 }
 
+RTS_RESULT ApplicationHost::declare_pou(Plc_Pou* pou) {
+  if (collected_ != nullptr) return collected_->pous.declare(pou);
+  spdlog::error("plc_debug_declare_pou: POUs are declared in plc_app_init only");
+  return ERR_NOTINITIALIZED;
+}
+
+RTS_RESULT ApplicationHost::declare_pou_instance(const Plc_Pou* pou, const void* self, const char* path) {
+  if (collected_ != nullptr) return collected_->pous.declare_instance(pou, self, path);
+  spdlog::error("plc_debug_declare_instance: instances are declared in plc_app_init only");
+  return ERR_NOTINITIALIZED;
+}
+
 RTS_RESULT ApplicationHost::register_event(RTS_HANDLE event) {
   if (collected_ != nullptr && events_.is_own(event)) {
     // By the application that runs it is no obstacle; by a component it is.

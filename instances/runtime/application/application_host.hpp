@@ -12,6 +12,7 @@
 #include "instances/runtime/application/application_declaration.hpp"
 #include "instances/runtime/application/message_queue.hpp"
 #include "instances/runtime/blocks/block_service.hpp"
+#include "instances/runtime/debug/debug_service.hpp"
 #include "instances/runtime/memory/areas.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
@@ -55,6 +56,8 @@ class ApplicationHost {
   [[nodiscard]] Areas& areas() noexcept { return areas_; }
   [[nodiscard]] const Areas& areas() const noexcept { return areas_; }
   [[nodiscard]] VariableService& variables() noexcept { return variables_; }
+  [[nodiscard]] DebugService& debug() noexcept { return debug_; }
+  [[nodiscard]] const DebugService& debug() const noexcept { return debug_; }
 
   /// The declaration of the running application.
   [[nodiscard]] const ApplicationDeclaration& declaration() const noexcept { return declaration_; }
@@ -111,6 +114,8 @@ class ApplicationHost {
   [[nodiscard]] RTS_RESULT keep_variables(const std::string& name, const CarriedVariables& variables);
   [[nodiscard]] RTS_HANDLE declare_area(const Plc_Area* area, RTS_RESULT& result);
   [[nodiscard]] RTS_RESULT declare_variable(const Plc_Variable* variable);
+  [[nodiscard]] RTS_RESULT declare_pou(Plc_Pou* pou);
+  [[nodiscard]] RTS_RESULT declare_pou_instance(const Plc_Pou* pou, const void* self, const char* path);
   [[nodiscard]] RTS_RESULT register_event(RTS_HANDLE event);
   [[nodiscard]] RTS_RESULT unregister_event(RTS_HANDLE event);
   [[nodiscard]] RTS_RESULT add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
@@ -136,6 +141,7 @@ class ApplicationHost {
   MessageQueue messages_;
   TaskTable task_table_;
   VariableService variables_;  // the cycles of areas_ use its forces
+  DebugService debug_;
   Areas areas_;
   int start_kind_ = PLC_START_FIRST;
   ApplicationDeclaration declaration_;

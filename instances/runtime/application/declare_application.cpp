@@ -5,6 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "instances/runtime/application/elf_check.hpp"
 #include "instances/runtime/tasks/registered_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
 #include "shm/base/transient.hpp"
@@ -110,7 +113,26 @@ Result<void> check_declaration(const LoadContext& context, DeclaredApplication& 
 
 }  // namespace
 
+namespace {
+
+// Another fault of the file is reported when it is loaded.
+Result<void> refuse_debug_build(const std::string& path) {
+  const auto bytes = read_program(path);
+  if (!bytes) return {};
+  const auto debug = is_debug_build(*bytes);
+  if (!debug || !*debug) return {};
+  return failure(ErrorCode::refused,
+                 fmt::format("{} is a debug build, and this host says allow_debug = false: build it without "
+                             "--debug",
+                             path));
+}
+
+}  // namespace
+
 Result<DeclaredApplication> declare_application(const std::string& path, const LoadContext& context) {
+  if (context.launch.no_debug) {
+    PLCHOST_TRY(refuse_debug_build(path));
+  }
   auto declared = Application::load(path, context.host);
   if (!declared) return declared;
   auto checked = check_declaration(context, *declared);

@@ -171,6 +171,19 @@ Result<void> check_elf(ElfBytes file, std::span<const std::string_view> symbols)
   return {};
 }
 
+Result<bool> is_debug_build(ElfBytes file) {
+  constexpr std::string_view kImport("plc_debug_declare_pou\0", 22);
+  PLCHOST_TRY_ASSIGN(const auto header, check_header(file));
+  PLCHOST_TRY_ASSIGN(const auto tables, find_tables(file, header));
+  PLCHOST_TRY_ASSIGN(const auto symbols, find_symbols(file, tables.sections));
+  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(symbols.entries, i); ++i) {
+    if (symbol->st_shndx != SHN_UNDEF) continue;
+    const auto name = elf_slice(symbols.names, symbol->st_name, kImport.size());
+    if (name && std::memcmp(name->data(), kImport.data(), kImport.size()) == 0) return true;
+  }
+  return false;
+}
+
 Result<std::vector<std::byte>> read_program(const std::string& path) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!fd) {

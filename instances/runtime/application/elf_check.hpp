@@ -22,6 +22,9 @@ inline constexpr std::size_t kMaxProgramFile = std::size_t{256} << 20;
 /// Set-up.
 [[nodiscard]] Result<void> check_elf_can_leave(std::span<const std::byte> file);
 
+/// Whether a file that check_elf() has passed can be debugged: it imports plc_debug_declare_pou. Set-up.
+[[nodiscard]] Result<bool> is_debug_build(std::span<const std::byte> file);
+
 /// The bytes of a program; the text does not name the path. not_found: no such file. Set-up.
 [[nodiscard]] Result<std::vector<std::byte>> read_program(const std::string& path);
 

@@ -254,6 +254,7 @@ Result<std::string> Instance::make_tasks() {
   PLCHOST_TRY_ASSIGN(tasks_,
                      TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment)));
   host_->task_table().attach(tasks_.get());
+  PLCHOST_TRY(attach_debugger());
   reference_ = follow_reference(tasks_->distributed_clock(), start_.settings.scheduler.distributed_clock,
                                 options_.launch.pool);
   notify_tasks(EVT_ExternalEventTaskCreateDone);

@@ -23,6 +23,7 @@
 #include "instances/runtime/setup/setup_reporter.hpp"
 #include "instances/runtime/time/reference.hpp"
 #include "schedulers/task_set.hpp"
+#include "shm/pages/debug_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
@@ -49,6 +50,8 @@ class Instance {
   /// The same of serve_values().
   [[nodiscard]] int values_fd() const noexcept { return values_ ? values_->fd() : -1; }
   void serve_values() { values_->serve(); }
+  /// Readable when advance() has something to do for its debugger; -1: the application is no debug build.
+  [[nodiscard]] int debug_fd() const noexcept { return host_ ? host_->debug().fd() : -1; }
 
   /// Readable when serve_faults() has something to do; -1: there are no tasks.
   [[nodiscard]] int fault_fd() const noexcept { return tasks_ ? tasks_->fault_fd() : -1; }
@@ -122,6 +125,24 @@ class Instance {
   void advance_change();
   [[nodiscard]] std::string finish_change(Duration held);
   void drop_change(const std::string& why);
+  [[nodiscard]] std::optional<Duration> take_over_now();
+
+  // Its debugger: instance_debug.cpp
+  /// If the application is a debug build.
+  [[nodiscard]] Result<void> attach_debugger();
+  [[nodiscard]] Result<std::string> debug(const std::string& command);
+  void advance_debugger();
+  void show_debug_state();
+  [[nodiscard]] bool has_debugger() const noexcept;
+  /// All tasks that halt go on, and none halts until resume_debugging(). Their outputs stay safe: a stop
+  /// follows.
+  void let_tasks_go(std::string_view why);
+  /// The same, and outputs follow their cycles again.
+  void let_tasks_go_on(std::string_view why);
+  void show_halts() noexcept;
+  void resume_debugging();
+  /// "2 halted tasks were let go first", or nothing. Once.
+  [[nodiscard]] std::string take_let_go();
 
   // Variables that are seen from outside: instance_variables.cpp
   /// A change of variables that waits for a moment between all cycles.
@@ -191,6 +212,9 @@ class Instance {
   std::optional<ValueServer> values_;
   std::deque<PendingOrder> orders_;
   std::optional<TransitionRing> transitions_;
+  std::optional<DebugPage> debug_page_;  // of a debug build
+  TimePoint debug_shown_;                // when it was written last
+  std::size_t let_go_ = 0;               // halted tasks, of which no reply has told yet
   ApplicationLife life_;
   std::vector<bool> unbound_;  // tasks of external events that run nothing any more, since the last start
   std::optional<Waiting> waiting_;

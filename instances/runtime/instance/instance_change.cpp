@@ -28,15 +28,26 @@ Result<std::string> Instance::begin_change(const std::string& path) {
   }
   PLCHOST_TRY_ASSIGN(change_, OnlineChange::prepare(path, load_context(), *application_));
   change_ends_ = MonotonicClock::now() + kChangePatience;
-  if (const auto held = tasks_->between_cycles([this] { change_->take_over(); })) return finish_change(*held);
+  let_tasks_go_on("another version takes over");
+  if (const auto held = take_over_now()) return finish_change(*held);
   return {};
+}
+
+// A task that halts in the middle of a cycle would go on in code that is gone.
+std::optional<Duration> Instance::take_over_now() {
+  bool whole = false;
+  const auto held = tasks_->between_cycles([&] {
+    whole = !tasks_->stands_still();
+    if (whole) change_->take_over();
+  });
+  return whole ? held : std::nullopt;
 }
 
 void Instance::advance_change() {
   if (const auto faulty = tasks_->tasks_in_exception(); !faulty.empty()) {
     return drop_change(fmt::format("in exception: task {}", join_names(faulty)));
   }
-  if (const auto held = tasks_->between_cycles([this] { change_->take_over(); })) {
+  if (const auto held = take_over_now()) {
     const std::string text = finish_change(*held);
     beat();
     return answer_waiting(ErrorCode::ok, text);
@@ -58,7 +69,10 @@ std::string Instance::finish_change(Duration held) {
     spdlog::error("{}; the variables of the new version cannot be seen", shown.error().describe());
   const double us = std::chrono::duration<double, std::micro>(held).count();
   life_.stay(fmt::format("online change to {}", application_->path()));
-  std::string text = fmt::format("taken over between two cycles, within {:.0f} us: {}", us, carried);
+  resume_debugging();
+  std::string text = take_let_go();
+  if (!text.empty()) text += "; ";
+  text += fmt::format("taken over between two cycles, within {:.0f} us: {}", us, carried);
   spdlog::info("online change from {} to {}: {}", before, application_->path(), text);
   return text;
 }
@@ -68,6 +82,7 @@ void Instance::drop_change(const std::string& why) {
   if (!change_) return;
   const std::string path = change_->path();
   change_.reset();
+  resume_debugging();
   answer_waiting(ErrorCode::refused, fmt::format("{} has not taken over: {}; nothing is changed", path, why));
 }
 

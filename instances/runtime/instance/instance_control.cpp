@@ -40,7 +40,7 @@ std::optional<ControlReply> Instance::handle(const ControlRequest& request,
     advance();
     return std::nullopt;
   }
-  if (request.verb != ControlVerb::status) {
+  if (request.verb != ControlVerb::status && request.verb != ControlVerb::debug) {
     spdlog::info("{} {}: {}", to_string(request.verb), request.argument,
                  done ? "done" : done.error().describe());
   }
@@ -90,6 +90,7 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
           [](Instance& self, const auto& asked) { return self.begin_order(asked); }),
       Row(ControlVerb::unforce_variable,
           [](Instance& self, const auto& asked) { return self.begin_order(asked); }),
+      Row(ControlVerb::debug, [](Instance& self, const auto& asked) { return self.debug(asked.argument); }),
       Row(ControlVerb::reset_statistics,
           [](Instance& self, const auto& asked) { return self.reset_statistics(asked.argument); }),
       Row(ControlVerb::shutdown,
@@ -110,10 +111,14 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
 Result<std::string> Instance::set_scheduler(const std::string& name) {
   PLCHOST_TRY(find_scheduler(name));
   if (life_.state() == ApplicationState::running) {
-    PLCHOST_TRY(tasks_->switch_to(name, start_.settings.scheduler));
+    let_tasks_go_on("the scheduler is exchanged");
+    const auto switched = tasks_->switch_to(name, start_.settings.scheduler);
+    if (switched) scheduler_ = name;
+    resume_debugging();
+    if (!switched) return std::unexpected(switched.error());
   }
   scheduler_ = name;
-  return {};
+  return take_let_go();
 }
 
 Result<std::string> Instance::set_log_level(const std::string& name) {

@@ -14,6 +14,8 @@ namespace plchost {
 namespace {
 
 constexpr auto kSoon = std::chrono::milliseconds(1);
+// Log points, and the debugger's presence.
+constexpr auto kDebugLook = std::chrono::milliseconds(20);
 // A thread that waits between two cycles parks within this, on however busy a core.
 constexpr auto kParkPatience = std::chrono::milliseconds(200);
 
@@ -43,6 +45,7 @@ Result<TaskSet::Prepared> Instance::prepare_start() {
 
 void Instance::start(TaskSet::Prepared prepared, std::string_view why) {
   host_->areas().outputs().arm();
+  if (has_debugger()) host_->debug().resume(scheduler_);  // the first cycle can halt
   tasks_->start(std::move(prepared));
   host_->events().publish_bound(true);
   unbound_.assign(application_->tasks().size(), false);
@@ -65,11 +68,13 @@ void Instance::unbind(std::size_t index) {
 }
 
 void Instance::begin_stop(std::string_view why) {
+  let_tasks_go(why);
   (void)tasks_->begin_stop(start_.settings.stop);
   life_.go_to(ApplicationState::stopping, why);
 }
 
 Result<std::string> Instance::begin_single_cycle() {
+  if (has_debugger()) host_->debug().resume(scheduler_);
   host_->areas().outputs().arm();
   if (auto begun = tasks_->begin_single_cycle(start_.settings.scheduler); !begun) {
     host_->areas().outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
@@ -88,12 +93,16 @@ void Instance::advance() {
   advance_orders();
   if (change_) advance_change();
   advance_values();
+  advance_debugger();
   if (!in_transition()) return;
   if (life_.state() == ApplicationState::single_cycle && !tasks_->stop_begun()) {
     const bool done = tasks_->single_cycle_done();
+    // A task that a debugger halts does not use up the time.
+    if (host_->debug().halted() > 0) single_cycle_ends_ = MonotonicClock::now() + start_.settings.stop.others;
     if (!done && MonotonicClock::now() < single_cycle_ends_) return;
     // Those that wait for their turn park at once; a task that does not is caught in its cycle.
     const Duration patience = done ? start_.settings.stop.others : Duration(kParkPatience);
+    let_tasks_go("the single cycle is over");
     (void)tasks_->begin_stop({.outputs = patience, .others = patience});
   }
   if (const auto stuck = tasks_->advance_stop()) finish_transition(*stuck);
@@ -107,7 +116,7 @@ void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
                 single ? "each task has run one cycle" : "all tasks are at the end of their cycles");
     host_->areas().save();
     beat();
-    return answer_waiting(ErrorCode::ok, "");
+    return answer_waiting(ErrorCode::ok, take_let_go());
   }
   std::vector<std::string> late;
   for (const std::size_t task : stuck) late.push_back(time_out(task));
@@ -133,6 +142,7 @@ void Instance::enter_exception(const std::string& reason) {
   host_->areas().outputs().put_safe(PLC_IMAGE_STATE_EXCEPTION);
   if (!life_.go_to(ApplicationState::exception, reason)) return;
   drop_change("the application that runs is in exception");
+  let_tasks_go("the application is in exception");
   tasks_->park_all();
   host_->events().publish_bound(false);
   beat();
@@ -163,8 +173,9 @@ bool Instance::ended() const noexcept {
 
 std::optional<Duration> Instance::wants_advance_in() const noexcept {
   const bool for_variables = !orders_.empty() || (values_ && values_->has_work());
-  if (!in_transition() && !change_ && !for_variables) return std::nullopt;
-  return kSoon;
+  if (in_transition() || change_ || for_variables) return kSoon;
+  if (has_debugger() && host_->debug().has_work()) return kDebugLook;
+  return std::nullopt;
 }
 
 Result<void> Instance::shut_down() {
@@ -175,6 +186,7 @@ Result<void> Instance::shut_down() {
   Result<void> stopped;
   bool settled = true;
   if (tasks_) {
+    let_tasks_go("the process ends");
     tasks_->park_all();
     host_->events().publish_bound(false);
     const auto busy = tasks_->still_busy(MonotonicClock::now() + kParkPatience);
@@ -192,6 +204,7 @@ Result<void> Instance::shut_down() {
   if (page_) {
     InstancePage::remove(options_.launch.pool, options_.launch.name);
     SymbolPage::remove(options_.launch.pool, options_.launch.name);
+    DebugPage::remove(options_.launch.pool, options_.launch.name);
   }
   // Under a manager there will be a next process: the numbers go on, and it may need the settings.
   if (options_.launch.report_fd < 0) {

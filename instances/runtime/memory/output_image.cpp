@@ -60,6 +60,11 @@ void OutputImage::reserve(std::span<const ByteRange> ranges) noexcept {
     (void)put_into(shown_, ranges);
 }
 
+void OutputImage::go_on() noexcept {
+  const std::uint64_t told = plc_image_control(&image_);
+  if ((told & PLC_IMAGE_STATE) == PLC_IMAGE_STATE_HALTED) told_.store(told, std::memory_order_relaxed);
+}
+
 bool OutputImage::put_safe_bytes(std::span<const ByteRange> ranges) noexcept {
   return keeps() || put_into(safe_, ranges);
 }

@@ -40,10 +40,13 @@ class OutputImage {
   /// signal handlers included.
   void fail() noexcept;
   /// Puts the bytes that are shown now into the next images, until the task that writes them has published.
-  /// Control thread, while all tasks are parked.
+  /// Control thread, while that task does not run.
   void reserve(std::span<const ByteRange> ranges) noexcept;
   /// The next publication ends put_safe(). Control thread, while all tasks are parked.
   void arm() noexcept { told_.store(plc_image_control(&image_), std::memory_order_relaxed); }
+  /// The next publication ends put_safe(PLC_IMAGE_STATE_HALTED), if nothing else was told since. Control
+  /// thread.
+  void go_on() noexcept;
   /// Puts safe bytes into the images that are published. false: others were faster too often. Control thread.
   [[nodiscard]] bool put_safe_bytes(std::span<const ByteRange> ranges) noexcept;
   /// After each publication.

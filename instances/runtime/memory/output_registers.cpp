@@ -16,7 +16,7 @@ OutputRegisters::OutputRegisters(std::span<std::byte> registers, std::vector<Byt
 
 void OutputRegisters::change(std::size_t at, std::byte value) noexcept {
   if (!keeps()) changed_[at].store(value, std::memory_order_relaxed);
-  write(at, std::span(&value, 1));
+  if (!off()) write(at, std::span(&value, 1));
 }
 
 void OutputRegisters::restore(ByteRange range) noexcept {

@@ -25,7 +25,7 @@ class OutputRegisters {
   void write(std::size_t at, std::span<const std::byte> bytes) noexcept {
     copy_to_registers(registers_.subspan(at, bytes.size()), bytes);
   }
-  /// Of bytes that several tasks change.
+  /// Of bytes that several tasks change. While they are off it is kept for restore().
   void change(std::size_t at, std::byte value) noexcept;
   /// Writes them as they were changed last.
   void restore(ByteRange range) noexcept;
@@ -35,7 +35,7 @@ class OutputRegisters {
   void put_safe() noexcept;
   /// The same of some of them, beside tasks that write others.
   void put_safe(std::span<const ByteRange> ranges) noexcept;
-  /// Tasks write again. Control thread, while all are parked.
+  /// Tasks write again. Control thread.
   void arm() noexcept { off_.store(false, std::memory_order_seq_cst); }
 
   [[nodiscard]] bool keeps() const noexcept { return safe_.empty(); }

@@ -21,6 +21,7 @@ bool SafeOutputs::has_failed(const Block& block) const noexcept {
 }
 
 void SafeOutputs::put_safe(Block& block, unsigned state) noexcept {
+  block.halted = state == PLC_IMAGE_STATE_HALTED;
   const bool failed =
       (failed_.load(std::memory_order_relaxed) || has_failed(block)) && state != PLC_IMAGE_STATE_ENDED;
   if (block.image != nullptr) return block.image->put_safe(failed ? PLC_IMAGE_STATE_EXCEPTION : state);
@@ -38,7 +39,7 @@ void SafeOutputs::put_safe(unsigned state) noexcept {
 void SafeOutputs::fail() noexcept {
   // Not for a process that the application has forked, nor after the end.
   if (::getpid() != process_.load(std::memory_order_relaxed)) return;
-  failed_.store(true, std::memory_order_relaxed);
+  failed_.store(true, std::memory_order_seq_cst);
   for (const Block& block : blocks_) {
     if (block.image != nullptr) {
       block.image->fail();
@@ -53,7 +54,9 @@ void SafeOutputs::arm() noexcept {
   rests_.assign(rests_.size(), false);
   for (Block& block : blocks_) {
     block.unsettled = false;
-    for (const Writer& writer : block.writers) {
+    block.halted = false;
+    for (Writer& writer : block.writers) {
+      writer.halted = false;
       writer.view->arm();
       if (block.image != nullptr && block.writers.size() > 1) block.image->reserve(writer.alone);
     }
@@ -91,6 +94,37 @@ void SafeOutputs::task_fails(std::size_t task) noexcept {
   }
 }
 
+void SafeOutputs::halt(const std::function<bool(std::size_t task)>& is_halted) noexcept {
+  if (!armed_) return;
+  for (Block& block : blocks_) {
+    bool halted = false;
+    for (Writer& writer : block.writers) {
+      const bool before = std::exchange(writer.halted, is_halted(writer.task) && !fails_[writer.task]);
+      halted |= writer.halted;
+      if (writer.halted && !before) hold(block, writer);
+    }
+    if (block.halted && !halted) go_on(block);
+  }
+}
+
+void SafeOutputs::hold(Block& block, const Writer& halted) noexcept {
+  // Registers that are kept need nothing: the task writes none, and other tasks go on.
+  if (block.image == nullptr && block.registers->keeps()) return;
+  if (!block.halted) put_safe(block, PLC_IMAGE_STATE_HALTED);
+  // When the others have gone on, its bytes follow with the end of its own cycle.
+  if (block.image != nullptr && block.writers.size() > 1) block.image->reserve(halted.alone);
+}
+
+void SafeOutputs::go_on(Block& block) noexcept {
+  block.halted = false;
+  block.unsettled = false;
+  if (block.image != nullptr) return block.image->go_on();
+  for (const Writer& writer : block.writers) writer.view->arm();
+  block.registers->arm();
+  // fail() may have come between: either this sees it, or the registers are off after it.
+  if (failed_.load(std::memory_order_seq_cst)) block.registers->put_safe();
+}
+
 void SafeOutputs::beat(const InCycle& in_cycle) noexcept {
   for (Block& block : blocks_) {
     if (block.image != nullptr) plc_image_beat(&block.image->image());
@@ -101,7 +135,7 @@ void SafeOutputs::beat(const InCycle& in_cycle) noexcept {
 // The look comes first: the last one that was within its cycle is written over after it.
 void SafeOutputs::settle(Block& block, const InCycle& in_cycle) noexcept {
   block.unsettled = std::ranges::any_of(block.writers, [&](const Writer& writer) {
-    return (!armed_ || fails_[writer.task]) && in_cycle(writer.task);
+    return (!armed_ || block.halted || fails_[writer.task]) && in_cycle(writer.task);
   });
   if (block.image == nullptr && block.registers->off()) return block.registers->put_safe();
   for (const Writer& writer : block.writers) {

@@ -25,6 +25,8 @@ namespace plchost {
 //   driven  Terminals are shown what the tasks put out. Bytes that one task alone writes follow with the end
 //           of its own first cycle.
 //
+// halt() leads a block from driven or armed to safe, and back to armed.
+//
 // An image keeps what the tasks put out last, and the safe values beside it. So a task goes on with its own
 // values. put_safe() changes what is shown, so nothing that a task publishes later is seen. Registers are
 // written over; a task that is just writing them when they are made safe is written over once more.
@@ -37,6 +39,7 @@ class SafeOutputs {
     std::size_t task = 0;
     OutputView* view = nullptr;
     std::vector<ByteRange> alone;  ///< the bytes that no other task writes
+    bool halted = false;           ///< a debugger halts the task
   };
   /// A block of outputs: an image, or registers.
   struct Block {
@@ -44,6 +47,7 @@ class SafeOutputs {
     OutputRegisters* registers = nullptr;  ///< if there is no image
     std::vector<Writer> writers{};
     bool unsettled = false;  ///< a task that is within a cycle may write over its safe values
+    bool halted = false;     ///< it is safe because a debugger halts a task that writes it
   };
 
   /// Whether a task is within a cycle, or a part of it that will end. The control thread asks.
@@ -64,12 +68,18 @@ class SafeOutputs {
   void task_rests(std::size_t task) noexcept;
   /// The task alone is in exception, and never publishes again. Control thread.
   void task_fails(std::size_t task) noexcept;
+  /// A debugger halts the tasks of which `is_halted` is true: blocks that they write are safe until the first
+  /// cycle of a task that ends after none of them halts any more. Control thread, while each of those tasks
+  /// stands still, and before it goes on.
+  void halt(const std::function<bool(std::size_t task)>& is_halted) noexcept;
   /// Now and then: gives a sign to terminals, and writes safe values again that a task may have written over.
   /// Control thread.
   void beat(const InCycle& in_cycle) noexcept;
 
  private:
   void put_safe(Block& block, unsigned state) noexcept;
+  void hold(Block& block, const Writer& halted) noexcept;
+  void go_on(Block& block) noexcept;
   [[nodiscard]] bool has_failed(const Block& block) const noexcept;
   void settle(Block& block, const InCycle& in_cycle) noexcept;
 

@@ -88,15 +88,17 @@ void OutputView::end_cycle() noexcept {
 }
 
 void OutputView::write_registers() noexcept {
-  if (registers_->off()) return;
-  for (const ByteRange own : writes_.own) registers_->write(own.offset, part(bytes_, own));
+  const bool off = registers_->off();
+  if (!off) {
+    for (const ByteRange own : writes_.own) registers_->write(own.offset, part(bytes_, own));
+  }
+  const bool restores = !off && armed_.exchange(false, std::memory_order_relaxed);
   for (const ByteRange shared : writes_.shared) {
     for (std::size_t at = shared.offset; at < shared.offset + shared.bytes; ++at) {
       if (bytes_[at] != base_[at]) registers_->change(at, bytes_[at]);
     }
-    if (armed_) registers_->restore(shared);
+    if (restores) registers_->restore(shared);
   }
-  armed_ = false;
 }
 
 }  // namespace plchost

@@ -51,9 +51,9 @@ class OutputView {
   /// `registers` outlive it.
   OutputView(std::vector<std::byte> initial, Writes writes, OutputRegisters& registers);
 
-  /// Its next publication is its first one since the outputs were safe. Control thread, while the task is
-  /// parked.
-  void arm() noexcept { armed_ = true; }
+  /// Its next publication is its first one since the outputs were safe. Control thread, before the registers
+  /// are armed.
+  void arm() noexcept { armed_.store(true, std::memory_order_relaxed); }
   /// From its next cycle on it publishes nothing more. Control thread.
   void give_up() noexcept { given_up_.store(true, std::memory_order_seq_cst); }
 
@@ -77,7 +77,7 @@ class OutputView {
   Writes writes_;
   OutputImage* image_ = nullptr;
   OutputRegisters* registers_ = nullptr;
-  bool armed_ = false;
+  std::atomic<bool> armed_{false};
   std::atomic<bool> given_up_{false};
   bool late_ = false;                     // the last cycle's are not out yet
   std::atomic<std::uint64_t> missed_{0};  // written by the task alone

@@ -63,6 +63,7 @@ class VariableService {
   [[nodiscard]] std::uint64_t stream() const noexcept { return page_ ? page_->stream() : 0; }
   [[nodiscard]] std::size_t count() const noexcept { return access_.symbols().size(); }
   [[nodiscard]] const Forces& forces() const noexcept { return forces_; }
+  [[nodiscard]] const VariableAccess& access() const noexcept { return access_; }
   /// "Main.speed, Line.count and 7 more"
   [[nodiscard]] std::string forced_names() const;
 

@@ -41,6 +41,12 @@ class CyclicKind final : public TaskKindState {
     grid_.shift(follower_->correction(grid_.next(), grid_.interval(), config_.start_offset, end));
   }
 
+  std::uint64_t pass_over(TimePoint until) noexcept override {
+    const std::uint64_t passed = grid_.pass_over(until);
+    set_due(grid_.next());
+    return passed;
+  }
+
   [[nodiscard]] Activation next_release(TimePoint ready,
                                         const FreewheelRule& /*rule*/) const noexcept override {
     const auto [release, lost_cycles] = grid_.plan(ready);

@@ -18,19 +18,13 @@
 #include "shm/pages/outputs_page.hpp"
 #include "shm/plc_process_image.h"
 #include "tests/support/whole_cycle.hpp"
-#include "tests/unit/instances/areas_under_test.hpp"
+#include "tests/unit/instances/safe_outputs_under_test.hpp"
 
 namespace plchost {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using Words = std::array<std::uint32_t, 3>;
-
-std::string area_with(const std::string& safe, const std::string& size = "12") {
-  return "[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Object=io\nLinux.Area.0.Size=" + size +
-         (safe.empty() ? "\n" : "\nLinux.Area.0.SafeState=" + safe + "\n");
-}
 
 TEST(SafeStateSetting, IsAWordInAnyCaseOrTheBytesInOrder) {
   EXPECT_EQ(parse_settings(area_with("Keep"), "l.cfg")->areas[0].safe, SafeState::keep);
@@ -65,47 +59,6 @@ TEST(SafeStateSetting, IsRefusedWithLineAndAllowedValues) {
                   .message,
               HasSubstr("has a SafeState, which is for outputs; its Flags 0x4 need 0x8"));
 }
-
-/// An area of three words: one of each of two tasks, and one of neither.
-class SafeOutputsOfAreas : public AreasUnderTest {
- protected:
-  ~SafeOutputsOfAreas() override { close(); }
-
-  void set_up(const std::string& safe, unsigned initial = 5) {
-    task("One", [this] {
-      words(one)[0] = value;
-      words(one)[2] = value + 2;
-    });
-    task("Two", [this] { words(two)[1] = value + 1; });
-    const Words initials{initial, initial, initial};
-    declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}}, nullptr, initials.data());
-    const auto placed = place_only(area_with(safe));
-    ASSERT_TRUE(placed) << placed.error().describe();
-    ASSERT_TRUE(sut.keep());
-    close();
-    ASSERT_EQ(plc_image_open(pool_.c_str(), "io", 12, PLC_IMAGE_READ, &terminal.emplace()), 0);
-  }
-  void close() {
-    if (terminal) plc_image_close(&*terminal);
-    terminal.reset();
-  }
-  static std::uint32_t* words(void* area) { return static_cast<std::uint32_t*>(area); }
-  void run(std::size_t task, unsigned with) {
-    value = with;
-    run_whole_cycle(tasks[task]);
-  }
-  [[nodiscard]] Words shown() const {
-    Words read{};
-    EXPECT_EQ(plc_image_read(&*terminal, read.data(), nullptr), PLC_IMAGE_OK);
-    return read;
-  }
-  [[nodiscard]] unsigned state() const { return plc_image_state(&*terminal); }
-
-  std::optional<plc_image> terminal;
-  void* one = nullptr;
-  void* two = nullptr;
-  unsigned value = 0;
-};
 
 TEST_F(SafeOutputsOfAreas, AreShownUntilTheFirstCycleAndOfATaskUntilItsOwn) {
   set_up("Zero");
@@ -244,21 +197,6 @@ TEST_F(SafeOutputsOfAreas, AreNoneOfTheNextWriterThatTellsNoState) {
   EXPECT_EQ(read, written);
   EXPECT_EQ(plc_image_state(&writer), PLC_IMAGE_STATE_UNTOLD);
   plc_image_close(&writer);
-}
-
-TEST_F(SafeOutputsOfAreas, OfGivenValuesAreShownWhileADebuggerHaltsTheTasks) {
-  set_up("0x010000000200000003000000");
-  EXPECT_EQ(shown(), (Words{1, 2, 3}));
-  sut.outputs().arm();
-  run(0, 10);
-  EXPECT_EQ(shown(), (Words{10, 2, 12}));
-  sut.outputs().put_safe(PLC_IMAGE_STATE_HALTED);
-  EXPECT_EQ(state(), PLC_IMAGE_STATE_HALTED);
-  EXPECT_EQ(shown(), (Words{1, 2, 3}));
-  sut.outputs().arm();
-  run(0, 11);
-  EXPECT_EQ(state(), PLC_IMAGE_STATE_RUNNING);
-  EXPECT_EQ(shown(), (Words{11, 2, 13}));
 }
 
 TEST_F(SafeOutputsOfAreas, AreNotLeftByATaskThatComesBackAfterAFault) {
@@ -402,36 +340,6 @@ TEST_F(SafeOutputsOfAreas, TellTheAgesOfTheLastImageAndOfTheProcess) {
     EXPECT_EQ(plc_image_age_ns(&*terminal), PLC_IMAGE_NEVER);
   }
 }
-
-/// The same in registers, which a file plays.
-class SafeRegisters : public SafeOutputsOfAreas {
- protected:
-  ~SafeRegisters() override { std::remove(file_.c_str()); }
-  void place_registers(const std::string& safe) {
-    std::ofstream(file_, std::ios::binary) << std::string(64, '\x07');
-    task("One", [this] {
-      words(one)[0] = value;
-      if (changes) words(one)[2] = value + 2;
-    });
-    task("Two", [this] { words(two)[1] = value + 1; });
-    declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}});
-    const auto placed = place_only(
-        fmt::format("[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Address=8\nLinux.Area.0.Device={}\n"
-                    "Linux.Area.0.Size=12\nLinux.Area.0.SafeState={}\n",
-                    file_, safe));
-    ASSERT_TRUE(placed) << placed.error().describe();
-    ASSERT_TRUE(sut.keep());
-  }
-  [[nodiscard]] Words in_file() const {
-    std::ifstream stream(file_, std::ios::binary);
-    stream.seekg(8);
-    Words read{};
-    stream.read(reinterpret_cast<char*>(read.data()), sizeof read);
-    return read;
-  }
-  std::string file_ = "/tmp/" + own_name("registers");
-  bool changes = true;
-};
 
 TEST_F(SafeRegisters, AreWrittenAtTheStartAndAtAStopAndComeBackAsTheyWere) {
   place_registers("0x010000000200000003000000");

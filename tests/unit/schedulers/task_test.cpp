@@ -303,5 +303,39 @@ TEST_F(TaskTest, KnowsTheFirstReleaseThatNoCycleHasBegunFor) {
   EXPECT_EQ(sut.due(), origin + milliseconds(10));
 }
 
+// A debugger halts it: neither the watchdog nor the statistics count the time.
+TEST_F(TaskTest, StandsStillInTheMiddleOfACycle) {
+  CycleGate gate;
+  TaskConfig config = cyclic();
+  config.watchdog.time = milliseconds(5);
+  Task* task = nullptr;
+  config.entry = [&] {
+    const auto since = task->trap().running_since();
+    clock.run_for(milliseconds(1));
+    task->stand_still([&] {
+      EXPECT_FALSE(task->in_cycle());
+      EXPECT_FALSE(task->trap().running_since());
+      EXPECT_FALSE(task->free_since());
+      EXPECT_TRUE(task->trap().seat().is_still());
+      clock.run_for(milliseconds(75));
+    });
+    EXPECT_TRUE(task->in_cycle());
+    EXPECT_EQ(task->trap().running_since().value(), since.value() + milliseconds(75));
+    EXPECT_FALSE(task->trap().seat().is_still());
+    clock.run_for(milliseconds(1));
+  };
+  Task sut(clock, config, statistics, nullptr);
+  task = &sut;
+  sut.pass(gate);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(counters().exec_last_ns, 2'000'000);
+  EXPECT_FALSE(sut.fault().raised());
+  EXPECT_EQ(sut.releases_passed(), 7U);  // at 10 ms to 70 ms, of a cycle that ended at 77 ms
+  const Activation next = sut.next_release(FreewheelRule({}));
+  EXPECT_EQ(next.lost_cycles, 0U);
+  EXPECT_EQ(next.release - TimePoint(Duration(counters().release_ns)), milliseconds(80));
+}
+
 }  // namespace
 }  // namespace plchost

@@ -1,5 +1,6 @@
 /* Refers to every function that the runtime offers, in plain C89: it loads only if each of them is there. */
 #include "../../../../instances/plc_app.h"
+#include "../../../../instances/plc_debug.h"
 
 typedef void (*any_function)(void);
 
@@ -15,6 +16,11 @@ const any_function every_call[] = {
     (any_function)plc_get_area_state,
     (any_function)plc_declare_variable,
     (any_function)plc_apply_forces,
+    (any_function)plc_debug_declare_pou,
+    (any_function)plc_debug_declare_instance,
+    (any_function)plc_debug_enter,
+    (any_function)plc_debug_leave,
+    (any_function)plc_debug_statement,
     (any_function)plc_keep_variables,
     (any_function)plc_online_change,
     (any_function)SchedRegisterExternalEvent,

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "api/cli/debug/debug_link.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// One client of the Debug Adapter Protocol. Tasks are threads. The instance is attached to with the request
+/// "attach"; its breakpoints go and its tasks go on with "disconnect", or when this object ends.
+class DapSession {
+ public:
+  /// `send` gets each message; both outlive this.
+  DapSession(DebugLink& link, std::function<void(const nlohmann::json&)> send, bool take)
+      : link_(link), send_(std::move(send)), take_(take) {}
+  ~DapSession();
+  DapSession(const DapSession&) = delete;
+  DapSession& operator=(const DapSession&) = delete;
+
+  /// Answers a request. False: the client has left.
+  [[nodiscard]] bool obey(const nlohmann::json& request);
+  /// Tells the client of halts and of lines of log points. An error: the session with the instance is over.
+  [[nodiscard]] Result<void> look();
+
+ private:
+  using Json = nlohmann::json;
+  using Answer = Result<Json>;  ///< the body
+
+  [[nodiscard]] Answer carry_out(const std::string& command, const Json& arguments);
+  [[nodiscard]] Answer attach();
+  [[nodiscard]] Answer set_breakpoints(const Json& arguments);
+  [[nodiscard]] Answer set_function_breakpoints(const Json& arguments);
+  [[nodiscard]] Json set_one(const std::string& key, const std::string& place, const Json& wanted);
+  void remove_of(const std::string& key);
+  [[nodiscard]] Answer threads();
+  [[nodiscard]] Answer stack(const Json& arguments);
+  [[nodiscard]] Answer scopes(const Json& arguments);
+  [[nodiscard]] Answer variables(const Json& arguments);
+  [[nodiscard]] Answer set_variable(const Json& arguments);
+  [[nodiscard]] Answer evaluate(const Json& arguments);
+  [[nodiscard]] Answer go_on(const std::string& command, const Json& arguments);
+  [[nodiscard]] Answer pause(const Json& arguments);
+  [[nodiscard]] Answer written(const std::string& instance, const std::string& name,
+                               const std::string& value);
+  [[nodiscard]] Result<std::string> task_of(const Json& arguments);
+  [[nodiscard]] std::string instance_of(std::int64_t frame) const;
+  void event(const std::string& name, Json body);
+  void tell_halts(const Json& state);
+
+  DebugLink& link_;
+  std::function<void(const Json&)> send_;
+  bool take_;
+  std::int64_t sequence_ = 1;
+  Json state_;
+  std::vector<std::string> tasks_;             // thread 1 is the first
+  std::map<std::string, std::uint64_t> told_;  // number of the last halt of each task
+  std::uint64_t logged_ = 0;
+  std::map<std::string, std::vector<std::uint32_t>> ids_;  // breakpoints by source, or "" of functions
+};
+
+}  // namespace plchost

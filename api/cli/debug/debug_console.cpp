@@ -1,0 +1,289 @@
+#include "api/cli/debug/debug_console.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdio>
+#include <functional>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/cli/interrupt.hpp"
+#include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr auto kLook = std::chrono::milliseconds(20);
+constexpr auto kStepPatience = std::chrono::seconds(5);
+constexpr double kWaitSeconds = 10;
+
+constexpr std::array kCommands = {
+    "break PLACE [hits COUNT] [if CONDITION] [log TEXT]",
+    "  PLACE is POU:LINE, FILE:LINE or POU. COUNT is =N, %N or >=N.",
+    "delete ID|*             list                        tasks",
+    "continue [TASK|*]       pause [TASK|*]              wait [SECONDS]",
+    "step [TASK]             next [TASK]                 out [TASK]          until PLACE",
+    "stack [TASK]            print [NAME]                set NAME=VALUE      task NAME",
+    "halts all|one           help                        quit"};
+
+std::string place_text(const Json& frame) {
+  return fmt::format("{}:{} ({}){}", frame.value("pou", ""), frame.value("line", 0U), frame.value("file", ""),
+                     frame.contains("instance") ? "  " + frame.value("instance", "") : std::string());
+}
+
+const Json* task_in(const Json& state, std::string_view name) {
+  if (!state.contains("tasks")) return nullptr;
+  const Json& tasks = state["tasks"];
+  const auto found =
+      std::ranges::find_if(tasks, [&](const Json& task) { return task.value("task", "") == name; });
+  return found == tasks.end() ? nullptr : &*found;
+}
+
+void print_line(std::string_view text) {
+  fmt::print("{}\n", printable(std::string(text)));
+  std::fflush(stdout);
+}
+
+void print_halt(const Json& task) {
+  std::string why = task.value("reason", "");
+  if (task.contains("breakpoint")) why += fmt::format(" {}", task.value("breakpoint", 0U));
+  const Json stack = task.value("stack", Json::array());
+  print_line(fmt::format("task {} halts: {} at {}", task.value("task", ""), why,
+                         stack.empty() ? std::string("?") : place_text(stack.front())));
+}
+
+}  // namespace
+
+void DebugConsole::say(const Result<void>& done) {
+  if (done) return;
+  failed_ = true;
+  std::fflush(stdout);
+  fmt::print(stderr, "plcctl: {}\n", printable(done.error().describe()));
+}
+
+bool DebugConsole::obey(std::string_view line) {
+  while (!line.empty() && (line.back() == ' ' || line.back() == '\r')) line.remove_suffix(1);
+  while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
+  if (line.empty() || line.front() == '#') return true;
+  const std::size_t space = std::min(line.find(' '), line.size());
+  const auto verb = line.substr(0, space);
+  const std::string rest(line.substr(std::min(space + 1, line.size())));
+  if (verb == "quit" || verb == "exit") return false;
+  say(carry_out(verb, rest));
+  return true;
+}
+
+Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& rest) {
+  using Do = std::function<Result<void>(DebugConsole&, const std::string&)>;
+  static const std::map<std::string_view, Do, std::less<>> kOwn = {
+      {"break", &DebugConsole::add_breakpoint},
+      {"list", [](auto& self, const auto&) { return self.list(); }},
+      {"tasks", [](auto& self, const auto&) { return self.tasks(); }},
+      {"stack", &DebugConsole::stack},
+      {"print", &DebugConsole::print},
+      {"set", &DebugConsole::set},
+      {"wait", &DebugConsole::wait},
+      {"task",
+       [](auto& self, const auto& name) {
+         self.task_ = name;
+         return Result<void>();
+       }},
+      {"help", [](auto&, const auto&) {
+         fmt::print("{}\n", fmt::join(kCommands, "\n"));
+         return Result<void>();
+       }}};
+  if (const auto own = kOwn.find(verb); own != kOwn.end()) return own->second(*this, rest);
+  static constexpr std::array kSteps = {"continue", "pause", "step", "next", "out", "until"};
+  if (std::ranges::find(kSteps, verb) != kSteps.end()) return go_on(verb, rest);
+  if (verb == "delete" || verb == "halts") {
+    PLCHOST_TRY(link_.command(fmt::format("{} {}", verb, rest)));
+    return {};
+  }
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is no command; 'help' lists them", shown(verb)));
+}
+
+Result<void> DebugConsole::add_breakpoint(const std::string& rest) {
+  PLCHOST_TRY_ASSIGN(const auto answer, link_.command("break " + rest));
+  print_line(fmt::format("breakpoint {} at {}", answer.value("id", 0U), place_text(answer)));
+  if (const std::string remark = answer.value("remark", ""); !remark.empty()) print_line(remark);
+  return {};
+}
+
+Result<void> DebugConsole::list() {
+  PLCHOST_TRY(look());
+  for (const Json& one : state_.value("breakpoints", Json::array())) {
+    std::string text = fmt::format("breakpoint {} at {}  hits {}", one.value("id", 0U), place_text(one),
+                                   one.value("hits", std::uint64_t{0}));
+    for (const auto& [key, word] :
+         {std::pair("hit_rule", "hits"), std::pair("condition", "if"), std::pair("log", "log")}) {
+      if (one.contains(key)) text += fmt::format("  {} {}", word, one.value(key, ""));
+    }
+    print_line(text);
+  }
+  return {};
+}
+
+Result<void> DebugConsole::tasks() {
+  PLCHOST_TRY(look());
+  for (const Json& task : state_.value("tasks", Json::array())) {
+    std::string text = fmt::format("task {}  {}", task.value("task", ""), task.value("state", ""));
+    if (task.contains("halts")) {
+      text += fmt::format("  halts {}, {} ms, {} releases passed meanwhile",
+                          task.value("halts", std::uint64_t{0}), task.value("halted_ms", std::int64_t{0}),
+                          task.value("releases_halted", std::uint64_t{0}));
+    }
+    const Json stack = task.value("stack", Json::array());
+    if (!stack.empty()) text += "  at " + place_text(stack.front());
+    print_line(text);
+  }
+  return {};
+}
+
+Result<std::string> DebugConsole::task_or_current(const std::string& named) {
+  if (!named.empty()) return named;
+  PLCHOST_TRY(look());
+  const Json* const current = task_in(state_, task_);
+  if (current != nullptr && current->value("state", "") == "halted") return task_;
+  for (const Json& task : state_.value("tasks", Json::array())) {
+    if (task.value("state", "") == "halted") return task.value("task", "");
+  }
+  return failure(ErrorCode::wrong_state, "no task halts; name one");
+}
+
+Result<void> DebugConsole::stack(const std::string& task) {
+  PLCHOST_TRY_ASSIGN(const auto name, task_or_current(task));
+  PLCHOST_TRY(look());
+  const Json* const found = task_in(state_, name);
+  if (found == nullptr || !found->contains("stack"))
+    return failure(ErrorCode::wrong_state, fmt::format("task '{}' does not halt", shown(name)));
+  std::size_t number = 0;
+  for (const Json& frame : (*found)["stack"]) print_line(fmt::format("#{} {}", number++, place_text(frame)));
+  task_ = name;
+  return {};
+}
+
+std::string DebugConsole::frame_instance() const {
+  const Json* const task = task_in(state_, task_);
+  if (task == nullptr || !task->contains("stack") || (*task)["stack"].empty()) return {};
+  return (*task)["stack"].front().value("instance", "");
+}
+
+Result<void> DebugConsole::print(const std::string& name) {
+  PLCHOST_TRY(look());
+  const std::string instance = frame_instance();
+  std::vector<plc_VariableRecord> found;
+  if (name.empty() && instance.empty()) {
+    return failure(
+        ErrorCode::wrong_state,
+        "no task halts in a program or function block; name a variable. Local variables of functions "
+        "are not seen");
+  }
+  if (name.empty() || name.find_first_of("*?") != std::string::npos) {
+    PLCHOST_TRY_ASSIGN(found, link_.variables(name.empty() ? instance + ".*" : name));
+  } else {
+    PLCHOST_TRY_ASSIGN(const auto one, link_.variable(instance, name));
+    found.push_back(one);
+  }
+  for (const auto& variable : found) {
+    print_line(fmt::format("{} = {}{}", dds::text_of(variable.name), dds::text_of(variable.value),
+                           variable.forced ? "  forced" : ""));
+  }
+  return {};
+}
+
+Result<void> DebugConsole::set(const std::string& order) {
+  const std::size_t equal = order.find('=');
+  if (equal == std::string::npos || equal == 0)
+    return failure(ErrorCode::invalid_argument, fmt::format("'{}' is not NAME=VALUE", shown(order)));
+  PLCHOST_TRY(look());
+  std::string name = order.substr(0, equal);
+  while (!name.empty() && name.back() == ' ') name.pop_back();
+  std::size_t begin = equal + 1;
+  while (begin < order.size() && order[begin] == ' ') ++begin;
+  PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(frame_instance(), name));
+  name = dds::text_of(variable.name);
+  PLCHOST_TRY(link_.write(fmt::format("{}={}", name, order.substr(begin))));
+  return print(name);
+}
+
+Result<void> DebugConsole::go_on(std::string_view verb, const std::string& rest) {
+  const bool steps = verb != "continue" && verb != "pause";
+  std::string task = verb == "until" ? std::string() : rest;
+  if (steps) {
+    PLCHOST_TRY_ASSIGN(task, task_or_current(task));
+  } else if (task.empty()) {
+    task = "*";
+  }
+  PLCHOST_TRY(look());
+  PLCHOST_TRY_ASSIGN(const auto answer, link_.command(verb == "until" ? fmt::format("until {} {}", task, rest)
+                                                                      : fmt::format("{} {}", verb, task)));
+  if (const std::string remark = answer.value("remark", ""); !remark.empty()) print_line(remark);
+  return steps ? wait_for_halt(task, kStepPatience) : Result<void>();
+}
+
+Result<void> DebugConsole::wait(const std::string& seconds) {
+  double given = kWaitSeconds;
+  if (!seconds.empty()) {
+    const auto [end, error] = std::from_chars(seconds.data(), seconds.data() + seconds.size(), given);
+    if (error != std::errc{} || end != seconds.data() + seconds.size() || given < 0 || given > 86400) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("'{}' is no number of seconds from 0 to 86400", shown(seconds)));
+    }
+  }
+  return wait_for_halt("", std::chrono::duration_cast<Duration>(std::chrono::duration<double>(given)));
+}
+
+// The halts that were told before do not count. A task that is named is let go before this.
+Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patience) {
+  const TimePoint end = MonotonicClock::now() + patience;
+  const auto before = told_;
+  for (;;) {
+    PLCHOST_TRY(look());
+    const bool halted = std::ranges::any_of(told_, [&](const auto& entry) {
+      const auto known = before.find(entry.first);
+      return (task.empty() || task == entry.first) &&
+             (known == before.end() || known->second != entry.second);
+    });
+    if (halted) return {};
+    if (MonotonicClock::now() >= end || interrupted()) {
+      return failure(ErrorCode::timed_out, fmt::format("{} has not halted within {:.1f} s",
+                                                       task.empty() ? "no task" : "task '" + task + "'",
+                                                       std::chrono::duration<double>(patience).count()));
+    }
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+void DebugConsole::take(const Json& state) {
+  state_ = state;
+  for (const Json& line : state.value("log", Json::array())) {
+    const auto number = line.value("number", std::uint64_t{0});
+    if (number <= logged_) continue;
+    logged_ = number;
+    print_line("log: " + line.value("text", ""));
+  }
+  for (const Json& task : state.value("tasks", Json::array())) {
+    if (task.value("state", "") != "halted") continue;
+    const std::string name = task.value("task", "");
+    const auto halt = task.value("halt", std::uint64_t{0});
+    if (std::exchange(told_[name], halt) == halt) continue;
+    task_ = name;
+    print_halt(task);
+  }
+}
+
+Result<void> DebugConsole::look() {
+  PLCHOST_TRY_ASSIGN(const auto state, link_.state());
+  take(state);
+  return {};
+}
+
+}  // namespace plchost

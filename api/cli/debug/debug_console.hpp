@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "api/cli/debug/debug_link.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// The commands of "plcctl debug": lines from a terminal, a file or a pipe.
+class DebugConsole {
+ public:
+  explicit DebugConsole(DebugLink& link) noexcept : link_(link) {}
+
+  /// Carries out a line; false: it was the last one. Answers and errors are printed.
+  bool obey(std::string_view line);
+  /// Prints the tasks that have halted since the last call, and the lines of log points. An error: the
+  /// session is over.
+  [[nodiscard]] Result<void> look();
+  /// A command has failed.
+  [[nodiscard]] bool failed() const noexcept { return failed_; }
+
+ private:
+  void say(const Result<void>& done);
+  [[nodiscard]] Result<void> carry_out(std::string_view verb, const std::string& rest);
+  [[nodiscard]] Result<void> add_breakpoint(const std::string& rest);
+  [[nodiscard]] Result<void> list();
+  [[nodiscard]] Result<void> tasks();
+  [[nodiscard]] Result<void> stack(const std::string& task);
+  [[nodiscard]] Result<void> print(const std::string& name);
+  [[nodiscard]] Result<void> set(const std::string& order);
+  [[nodiscard]] Result<void> go_on(std::string_view verb, const std::string& rest);
+  [[nodiscard]] Result<void> wait(const std::string& seconds);
+  [[nodiscard]] Result<void> wait_for_halt(const std::string& task, Duration patience);
+  [[nodiscard]] Result<std::string> task_or_current(const std::string& named);
+  [[nodiscard]] std::string frame_instance() const;
+  void take(const nlohmann::json& state);
+
+  DebugLink& link_;
+  nlohmann::json state_;
+  std::string task_;                           // that halted last, or was named
+  std::map<std::string, std::uint64_t> told_;  // number of the last halt of each task
+  std::uint64_t logged_ = 0;
+  bool failed_ = false;
+};
+
+}  // namespace plchost

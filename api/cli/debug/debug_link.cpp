@@ -1,0 +1,132 @@
+#include "api/cli/debug/debug_link.hpp"
+
+#include <charconv>
+#include <iterator>
+
+#include <fmt/format.h>
+
+#include "api/cli/debug/foreign_json.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/variable_page.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/operations.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr int kAttempts = 5;
+// A write waits for a moment between cycles.
+constexpr auto kWritePatience = std::chrono::seconds(10);
+
+std::unexpected<Error> bad_answer(std::string_view text) {
+  return failure(ErrorCode::corrupt, fmt::format("the host's answer is not understood: '{}'", shown(text)));
+}
+
+Result<nlohmann::json> parsed(std::string_view text) {
+  auto json = object_in(text);
+  if (!json) return bad_answer(text);
+  return *std::move(json);
+}
+
+}  // namespace
+
+Result<std::string> DebugLink::call(std::int32_t operation, const std::string& argument) {
+  PLCHOST_TRY_ASSIGN(auto* const client, session_.client());
+  ApiRequest request;
+  request.host = host_;
+  request.operation = operation;
+  request.instance = instance_;
+  request.argument = argument;
+  PLCHOST_TRY_ASSIGN(auto reply, client->call(request, session_.deadline(kWritePatience)));
+  if (reply.code != ErrorCode::ok) return failure(reply.code, reply.text);
+  return std::move(reply.text);
+}
+
+Result<std::string> DebugLink::attach(bool take) {
+  PLCHOST_TRY_ASSIGN(const auto text,
+                     call(static_cast<std::int32_t>(ControlVerb::debug), take ? "attach take" : "attach"));
+  PLCHOST_TRY_ASSIGN(const auto answer, parsed(text));
+  number_ = answer.value("session", std::uint64_t{0});
+  if (number_ == 0) return bad_answer(text);
+  return answer.value("remark", std::string());
+}
+
+Result<void> DebugLink::detach() {
+  if (number_ == 0) return {};
+  const auto done = command("detach");
+  number_ = 0;
+  if (!done) return std::unexpected(done.error());
+  return {};
+}
+
+Result<nlohmann::json> DebugLink::command(const std::string& text) {
+  PLCHOST_TRY_ASSIGN(const auto answer, call(static_cast<std::int32_t>(ControlVerb::debug),
+                                             fmt::format("{} {}", number_, text)));
+  return parsed(answer);
+}
+
+Result<DebugLink::Part> DebugLink::part(std::size_t offset) {
+  PLCHOST_TRY_ASSIGN(const auto text, call(static_cast<std::int32_t>(ControlVerb::read_debug),
+                                           fmt::format("{} {}", number_, offset)));
+  Part part;
+  const char* const last = text.data() + text.size();
+  const auto version = std::from_chars(text.data(), last, part.version);
+  if (version.ec != std::errc{} || version.ptr == last) return bad_answer(text);
+  const auto size = std::from_chars(version.ptr + 1, last, part.size);
+  if (size.ec != std::errc{} || size.ptr == last) return bad_answer(text);
+  part.text.assign(size.ptr + 1, last);
+  return part;
+}
+
+// A long state comes in parts; when it changes in between it is asked for anew.
+Result<nlohmann::json> DebugLink::state() {
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    PLCHOST_TRY_ASSIGN(const auto first, part(0));
+    std::string text = first.text;
+    bool whole = true;
+    while (whole && text.size() < first.size) {
+      PLCHOST_TRY_ASSIGN(const auto more, part(text.size()));
+      whole = more.version == first.version && !more.text.empty();
+      text += more.text;
+    }
+    if (!whole) continue;
+    PLCHOST_TRY_ASSIGN(auto state, parsed(text));
+    if (number_ == 0 || state.value("session", std::uint64_t{0}) == number_) return state;
+    return failure(ErrorCode::wrong_state,
+                   "the debug session is over: the instance has ended it, or another "
+                   "debugger took over");
+  }
+  return failure(ErrorCode::busy, "the state of the debugger changes all the time; ask again");
+}
+
+Result<std::vector<plc_VariableRecord>> DebugLink::variables(const std::string& pattern) {
+  PLCHOST_TRY_ASSIGN(auto* const client, session_.client());
+  std::vector<plc_VariableRecord> all;
+  VariableQuery query{.patterns = {pattern}, .forced = false, .after = 0};
+  for (bool goes_on = true; goes_on;) {
+    PLCHOST_TRY_ASSIGN(auto page, client->list_variables(host_, instance_, query, session_.deadline()));
+    PLCHOST_TRY_ASSIGN(goes_on, next_page(host_, page, query));
+    std::ranges::move(page.variables, std::back_inserter(all));
+  }
+  return all;
+}
+
+Result<plc_VariableRecord> DebugLink::variable(const std::string& instance, const std::string& name) {
+  if (!instance.empty()) {
+    auto own = variables(fmt::format("{}.{}", instance, name));
+    if (own && own->size() == 1) return own->front();
+  }
+  PLCHOST_TRY_ASSIGN(const auto found, variables(name));
+  if (found.size() == 1) return found.front();
+  return failure(ErrorCode::not_found, fmt::format("no variable '{}' in '{}'", shown(name),
+                                                   instance.empty() ? instance_ : instance));
+}
+
+Result<void> DebugLink::write(const std::string& order) {
+  const auto done = call(static_cast<std::int32_t>(ControlVerb::write_variable), order);
+  if (!done) return std::unexpected(done.error());
+  return {};
+}
+
+}  // namespace plchost

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <control.h>
+#include <nlohmann/json.hpp>
+
+#include "api/cli/cli_session.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// A debug session with one instance: see instances/debugging.md.
+class DebugLink {
+ public:
+  DebugLink(CliSession& session, std::string host, std::string instance)
+      : session_(session), host_(std::move(host)), instance_(std::move(instance)) {}
+
+  [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
+
+  /// Begins the session; the remark of the instance. `take`: also if another debugger has it.
+  [[nodiscard]] Result<std::string> attach(bool take);
+  /// Ends it: breakpoints go, tasks go on.
+  [[nodiscard]] Result<void> detach();
+  [[nodiscard]] bool attached() const noexcept { return number_ != 0; }
+  /// A command to the instance, without the number of the session; its answer.
+  [[nodiscard]] Result<nlohmann::json> command(const std::string& text);
+  /// The state, which also tells the instance that this debugger is there. wrong_state: the session is over.
+  [[nodiscard]] Result<nlohmann::json> state();
+
+  /// The variables that a pattern names, with their values.
+  [[nodiscard]] Result<std::vector<plc_VariableRecord>> variables(const std::string& pattern);
+  /// The variable that a name means in a frame of `instance` (its path; empty: none): one of its own, else
+  /// one by its whole name. not_found: there is none.
+  [[nodiscard]] Result<plc_VariableRecord> variable(const std::string& instance, const std::string& name);
+  /// "NAME=VALUE" of a variable by its whole name.
+  [[nodiscard]] Result<void> write(const std::string& order);
+
+ private:
+  [[nodiscard]] Result<std::string> call(std::int32_t operation, const std::string& argument);
+  /// The rest of a part, and what its head says.
+  struct Part {
+    std::uint64_t version = 0;
+    std::size_t size = 0;
+    std::string text;
+  };
+  [[nodiscard]] Result<Part> part(std::size_t offset);
+
+  CliSession& session_;
+  std::string host_;
+  std::string instance_;
+  std::uint64_t number_ = 0;
+};
+
+}  // namespace plchost

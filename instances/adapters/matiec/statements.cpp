@@ -1,0 +1,119 @@
+#include "instances/adapters/matiec/statements.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <optional>
+
+#include <fmt/format.h>
+
+namespace plchost::matiec {
+
+namespace {
+
+constexpr std::string_view kBodyEnd = "_body__(";
+constexpr std::string_view kLine = "#line ";
+constexpr std::string_view kFunction = "// FUNCTION";
+
+// The last word before the first parenthesis.
+std::string_view name_before_parenthesis(std::string_view line) {
+  line = line.substr(0, line.find('('));
+  return line.substr(line.find_last_of(' ') + 1);
+}
+
+class Instrumenter {
+ public:
+  Instrumenter(std::string_view code, const JoinedSource& source) : code_(code), source_(source) {}
+
+  DebugCode run() {
+    made_.text = fmt::format("#include \"{}\"\n", kDebugFile);
+    while (!code_.empty()) {
+      const std::size_t end = std::min(code_.find('\n'), code_.size());
+      take(code_.substr(0, end));
+      code_.remove_prefix(std::min(end + 1, code_.size()));
+    }
+    for (DebugPou& pou : made_.pous) {
+      std::ranges::sort(pou.lines);
+      const auto twice = std::ranges::unique(pou.lines);
+      pou.lines.erase(twice.begin(), twice.end());
+    }
+    return std::move(made_);
+  }
+
+ private:
+  void take(std::string_view line) {
+    if (line.starts_with(kLine)) return take_statement(line.substr(kLine.size()));
+    if (line == kFunction) {
+      function_follows_ = true;
+    } else if (function_follows_ && line.find('(') != std::string_view::npos) {
+      begin(name_before_parenthesis(line), "0");
+      function_follows_ = false;
+    } else if (const std::size_t body = line.find(kBodyEnd);
+               body != std::string_view::npos && line.starts_with("void ") && line.ends_with('{')) {
+      begin(line.substr(0, body).substr(std::string_view("void ").size()), "data__");
+    }
+    made_.text += line;
+    made_.text += '\n';
+    if (!name_.empty() && !opened_at_ && line.ends_with('{')) opened_at_ = made_.text.size();
+  }
+
+  // The head of a function or of a body.
+  void begin(std::string_view name, std::string_view self) {
+    name_ = name;
+    self_ = self;
+    opened_at_.reset();
+    number_.reset();
+  }
+
+  // "N "FILE"": the statement of that line of the joined source follows. A POU with none stays as it is.
+  void take_statement(std::string_view line) {
+    unsigned joined = 0;
+    std::from_chars(line.data(), line.data() + line.size(), joined);
+    const iec::SourcePlace place = source_.place(joined, 1);
+    if (name_.empty() || !opened_at_ || joined == 0) return;
+    if (!number_) {
+      number_ = made_.pous.size();
+      made_.pous.push_back({.name = name_, .file = place.file, .lines = {}});
+      made_.text.insert(*opened_at_, fmt::format("  PLC_ENTER(plchost_pou_{}, {});\n", *number_, self_));
+    }
+    made_.pous[*number_].lines.push_back(place.line);
+    made_.text += fmt::format("PLC_STATEMENT({}u);\n", place.line);
+  }
+
+  std::string_view code_;
+  const JoinedSource& source_;
+  DebugCode made_;
+  bool function_follows_ = false;
+  std::string name_;  // of the POU that the text is in; empty: none yet
+  std::string self_;
+  std::optional<std::size_t> opened_at_;  // behind its brace
+  std::optional<std::size_t> number_;     // of its DebugPou
+};
+
+std::string in_quotes(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+}  // namespace
+
+DebugCode with_statements(std::string_view code, const JoinedSource& source) {
+  return Instrumenter(code, source).run();
+}
+
+std::string debug_header(const std::vector<DebugPou>& pous) {
+  std::string text = "/* Written by plcctl build application. */\n#include \"plc_debug.h\"\n";
+  for (std::size_t i = 0; i < pous.size(); ++i) {
+    text += fmt::format(
+        "static const unsigned int plchost_lines_{0}[] = {{{1}u}};\n"
+        "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u}};\n",
+        i, fmt::join(pous[i].lines, "u, "), pous[i].name, in_quotes(pous[i].file), pous[i].lines.size());
+  }
+  return text;
+}
+
+}  // namespace plchost::matiec

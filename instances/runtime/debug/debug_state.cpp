@@ -1,0 +1,90 @@
+// The state of a debug session as its debugger sees it: DebugService::state().
+
+#include <nlohmann/json.hpp>
+
+#include "instances/runtime/debug/debug_service.hpp"
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+std::string_view reason_text(HaltReason reason) noexcept {
+  switch (reason) {
+    case HaltReason::breakpoint:
+      return "breakpoint";
+    case HaltReason::step:
+      return "step";
+    case HaltReason::pause:
+      return "pause";
+  }
+  return "";
+}
+
+// The frames are on the stack of a thread that sleeps.
+Json frames_of(const Plc_Frame* frame, const PouCollection& pous, std::size_t most) {
+  Json frames = Json::array();
+  for (; frame != nullptr && frames.size() < most; frame = frame->pCaller) {
+    if (frame->pPou == nullptr || frame->pPou->dwNumber >= pous.pous().size()) break;
+    const DeclaredPou& pou = pous.pous()[frame->pPou->dwNumber];
+    Json one{{"pou", pou.name}, {"file", pou.file}, {"line", frame->dwLine}};
+    const auto path = pous.path_of(frame->pPou->dwNumber, frame->pSelf);
+    if (!path.empty()) one["instance"] = path;
+    frames.push_back(std::move(one));
+  }
+  return frames;
+}
+
+}  // namespace
+
+std::string DebugService::state(std::size_t most) const {
+  const PouCollection& pous = program_.pous();
+  const auto dump = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
+  for (const std::size_t frames : {kMostFrames, std::size_t{4}, std::size_t{1}}) {
+    Json tasks = Json::array();
+    for (std::size_t i = 0; i < tasks_.size(); ++i) {
+      const DebugTask& task = *tasks_[i];
+      const auto halt = task.halt();
+      Json one{{"task", name_of(i)}, {"state", halt ? "halted" : task.ignored() ? "ignored" : "runs"}};
+      if (task.halts() > 0) {
+        one["halts"] = task.halts();
+        one["halted_ms"] = task.halted_for() / std::chrono::milliseconds(1);
+        one["releases_halted"] = task.task().releases_passed();
+      }
+      if (!halt && (task.is_to_pause() || task.steps())) one["state"] = "steps";
+      if (halt) {
+        one["halt"] = halt->number;
+        one["reason"] = reason_text(halt->reason);
+        if (halt->breakpoint != 0) one["breakpoint"] = halt->breakpoint;
+        one["stack"] = frames_of(halt->frame, pous, frames);
+      }
+      tasks.push_back(std::move(one));
+    }
+    Json breakpoints = Json::array();
+    for (const auto& breakpoint : breakpoints_) {
+      const DeclaredPou& pou = pous.pous()[breakpoint->place.pou];
+      Json one{{"id", breakpoint->id},
+               {"pou", pou.name},
+               {"file", pou.file},
+               {"line", breakpoint->place.line},
+               {"hits", breakpoint->hits->load(std::memory_order_relaxed)}};
+      if (!breakpoint->order.condition.empty()) one["condition"] = breakpoint->order.condition;
+      if (!breakpoint->order.hits.empty()) one["hit_rule"] = breakpoint->order.hits;
+      if (!breakpoint->order.log.empty()) one["log"] = breakpoint->order.log;
+      breakpoints.push_back(std::move(one));
+    }
+    Json log = Json::array();
+    for (const LogLine& line : log_) log.push_back({{"number", line.number}, {"text", line.text}});
+    std::string text = dump({{"session", session_},
+                             {"halt_all", halt_all_},
+                             {"suspended", suspended_},
+                             {"tasks", std::move(tasks)},
+                             {"breakpoints", std::move(breakpoints)},
+                             {"log", std::move(log)}});
+    if (text.size() <= most) return text;
+  }
+  return dump({{"session", session_}, {"too_long", true}});
+}
+
+}  // namespace plchost

@@ -1,0 +1,162 @@
+#include "instances/runtime/debug/declared_pou.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
+#include "shm/variables/variable_symbol.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::size_t kMaxPouName = 63;
+constexpr std::size_t kMaxPouFile = 255;
+
+RTS_RESULT refuse_pou(RTS_RESULT why, std::string_view name, std::string_view text) {
+  spdlog::error("plc_debug_declare_pou: POU '{}': {}", shown(name), text);
+  return why;
+}
+
+std::string_view text_at(const char* text, std::size_t most) noexcept {
+  return text == nullptr ? std::string_view() : std::string_view(text, ::strnlen(text, most + 1));
+}
+
+bool is_pou_name(std::string_view name) noexcept {
+  const auto is_word = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  return !name.empty() && name.size() <= kMaxPouName && std::ranges::all_of(name, is_word);
+}
+
+bool ascend(std::span<const std::uint32_t> lines) noexcept {
+  return lines.front() > 0 && std::ranges::adjacent_find(lines, std::ranges::greater_equal()) == lines.end();
+}
+
+std::string_view last_name(std::string_view path) noexcept {
+  return path.substr(path.find_last_of('/') + 1);
+}
+
+}  // namespace
+
+std::optional<std::uint32_t> DeclaredPou::line_from(std::uint32_t line) const noexcept {
+  const auto found = std::ranges::lower_bound(lines, line);
+  return found == lines.end() ? std::nullopt : std::optional(*found);
+}
+
+RTS_RESULT PouCollection::declare(Plc_Pou* pou) {
+  if (pou == nullptr) return refuse_pou(ERR_PARAMETER, "", "pPou is null");
+  const auto name = text_at(pou->dwSize == sizeof(Plc_Pou) ? pou->pszName : nullptr, kMaxPouName);
+  if (pou->dwSize != sizeof(Plc_Pou))
+    return refuse_pou(ERR_PARAMETER, "", fmt::format("dwSize is not {}", sizeof(Plc_Pou)));
+  if (!is_pou_name(name)) {
+    return refuse_pou(ERR_PARAMETER, name,
+                      fmt::format("a name has 1 to {} letters, digits and _", kMaxPouName));
+  }
+  const auto file = text_at(pou->pszFile, kMaxPouFile);
+  if (file.empty() || file.size() > kMaxPouFile || !is_printable_utf8(file))
+    return refuse_pou(ERR_PARAMETER, name, fmt::format("pszFile has 1 to {} characters", kMaxPouFile));
+  if (pou->pdwLines == nullptr || pou->nLines == 0 || pou->nLines > PLC_MAX_POU_LINES)
+    return refuse_pou(ERR_PARAMETER, name, fmt::format("it has 1 to {} lines", PLC_MAX_POU_LINES));
+  const std::span lines(pou->pdwLines, pou->nLines);
+  if (!ascend(lines)) return refuse_pou(ERR_PARAMETER, name, "its lines are above 0 and ascend");
+  const bool known = std::ranges::any_of(
+      pous_, [&](const DeclaredPou& other) { return same_variable_name(other.name, name); });
+  if (known) return refuse_pou(ERR_DUPLICATE, name, "it is declared twice");
+  if (pous_.size() == PLC_MAX_POUS)
+    return refuse_pou(ERR_NOMEMORY, name, fmt::format("there are {} already", PLC_MAX_POUS));
+  pou->dwNumber = static_cast<unsigned>(pous_.size());
+  pous_.push_back(
+      {.name = std::string(name), .file = std::string(file), .lines = {lines.begin(), lines.end()}});
+  return ERR_OK;
+}
+
+RTS_RESULT PouCollection::declare_instance(const Plc_Pou* pou, const void* self, const char* path) {
+  const auto text = text_at(path, kMaxVariableName);
+  const auto refuse = [&](RTS_RESULT why, std::string_view reason) {
+    spdlog::error("plc_debug_declare_instance: '{}': {}", shown(text), reason);
+    return why;
+  };
+  const bool known =
+      pou != nullptr && pou->dwNumber < pous_.size() && pous_[pou->dwNumber].name == pou->pszName;
+  if (!known) return refuse(ERR_PARAMETER, "its POU is not declared");
+  if (self == nullptr) return refuse(ERR_PARAMETER, "pSelf is null");
+  if (text.empty() || text.size() > kMaxVariableName || !is_printable_utf8(text))
+    return refuse(ERR_PARAMETER, fmt::format("a path has 1 to {} characters", kMaxVariableName));
+  if (instances_.size() == PLC_MAX_POU_INSTANCES)
+    return refuse(ERR_NOMEMORY, fmt::format("there are {} already", PLC_MAX_POU_INSTANCES));
+  const bool added = instances_.emplace(std::pair(pou->dwNumber, self), text).second;
+  return added ? ERR_OK : refuse(ERR_DUPLICATE, "it is declared twice");
+}
+
+std::string_view PouCollection::path_of(std::uint32_t pou, const void* self) const noexcept {
+  const auto found = instances_.find({pou, self});
+  return found == instances_.end() ? std::string_view() : std::string_view(found->second);
+}
+
+std::optional<PouCollection::PouInstance> PouCollection::any_instance(std::uint32_t pou) const {
+  const auto found = instances_.lower_bound({pou, nullptr});
+  if (found == instances_.end() || found->first.first != pou) return std::nullopt;
+  return PouInstance{.self = found->first.second, .path = found->second};
+}
+
+Result<PouLine> PouCollection::find(std::string_view place) const {
+  const std::size_t colon = place.find_last_of(':');
+  std::uint32_t line = 0;
+  if (colon != std::string_view::npos) {
+    const auto digits = place.substr(colon + 1);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), line);
+    if (error != std::errc{} || end != digits.data() + digits.size() || line == 0) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("'{}' is no place: POU, POU:LINE or FILE:LINE is", shown(place)));
+    }
+  }
+  const auto name = place.substr(0, colon);
+  for (std::uint32_t pou = 0; pou < pous_.size(); ++pou) {
+    if (!same_variable_name(pous_[pou].name, name)) continue;
+    if (const auto found = pous_[pou].line_from(line)) return PouLine{.pou = pou, .line = *found};
+    return failure(ErrorCode::not_found,
+                   fmt::format("POU '{}' has no statement from line {} on; its last is in line {}",
+                               pous_[pou].name, line, pous_[pou].lines.back()));
+  }
+  if (colon != std::string_view::npos) return find_in_file(name, line);
+  std::vector<std::string> names;
+  for (const DeclaredPou& pou : pous_) names.emplace_back(pou.name);
+  return failure(ErrorCode::not_found,
+                 fmt::format("no POU '{}'; there are: {}", shown(name), join_some(names)));
+}
+
+// A POU that holds the line goes before one that only begins behind it.
+Result<PouLine> PouCollection::find_in_file(std::string_view file, std::uint32_t line) const {
+  std::optional<PouLine> best;
+  std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
+  bool known = false;
+  for (std::uint32_t pou = 0; pou < pous_.size(); ++pou) {
+    const bool whole = file.find('/') != std::string_view::npos;
+    if ((whole ? std::string_view(pous_[pou].file) : last_name(pous_[pou].file)) != file) continue;
+    known = true;
+    const auto found = pous_[pou].line_from(line);
+    if (!found || *found - line >= distance) continue;
+    distance = *found - line;
+    best = PouLine{.pou = pou, .line = *found};
+  }
+  if (best) return *best;
+  if (known) {
+    return failure(ErrorCode::not_found,
+                   fmt::format("'{}' has no statement from line {} on", shown(file), line));
+  }
+  std::vector<std::string> names;
+  for (const DeclaredPou& pou : pous_) {
+    names.emplace_back(pou.name);
+    if (std::ranges::find(names, last_name(pou.file)) == names.end()) names.emplace_back(last_name(pou.file));
+  }
+  return failure(ErrorCode::not_found,
+                 fmt::format("no POU or file '{}'; there are: {}", shown(file), join_some(names)));
+}
+
+}  // namespace plchost

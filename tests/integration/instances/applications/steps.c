@@ -1,0 +1,133 @@
+/* A program that can be debugged, written by hand: lines of "steps.st", of which there is no file. The tasks
+ * Main and Edge write an output area each. */
+#include <string.h>
+
+#include "instances/plc_app.h"
+#include "instances/plc_debug.h"
+#include "instances/plc_variables.h"
+
+PLC_EXPORT_ABI;
+
+struct counter {
+  short step;
+  int n;
+};
+static struct {
+  int cycles;
+  int doubled;
+  unsigned char go;
+  struct counter counter;
+} main_program;
+static struct {
+  int cycles;
+} other_program;
+static struct {
+  int runs;
+} edge_program;
+
+static void* main_output;
+static void* edge_output;
+
+static const unsigned int twice_lines[] = {2};
+static const unsigned int counter_lines[] = {12, 14};
+static const unsigned int main_lines[] = {22, 23, 24, 26};
+static const unsigned int other_lines[] = {32, 33};
+static const unsigned int edge_lines[] = {42};
+static Plc_Pou twice = {sizeof(Plc_Pou), "Twice", "src/steps.st", twice_lines, 1, 0};
+static Plc_Pou counter = {sizeof(Plc_Pou), "Counter", "src/steps.st", counter_lines, 2, 0};
+static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "src/steps.st", main_lines, 4, 0};
+static Plc_Pou other = {sizeof(Plc_Pou), "Other", "src/steps.st", other_lines, 2, 0};
+static Plc_Pou edge = {sizeof(Plc_Pou), "Edge", "src/steps.st", edge_lines, 1, 0};
+
+static int run_twice(int value) {
+  PLC_ENTER(twice, 0);
+  PLC_STATEMENT(2);
+  return 2 * value;
+}
+
+static void run_counter(struct counter* self) {
+  PLC_ENTER(counter, self);
+  PLC_STATEMENT(12);
+  if (self->step > 0) {
+    PLC_STATEMENT(14);
+    self->n += self->step;
+  }
+}
+
+static void CDECL run_main(void) {
+  PLC_ENTER(main_pou, &main_program);
+  PLC_STATEMENT(22);
+  ++main_program.cycles;
+  PLC_STATEMENT(23);
+  run_counter(&main_program.counter);
+  PLC_STATEMENT(24);
+  main_program.doubled = run_twice(main_program.counter.n);
+  PLC_STATEMENT(26);
+  main_program.go = 1;
+  *(int*)main_output = main_program.cycles;
+}
+
+static void CDECL run_other(void) {
+  PLC_ENTER(other, &other_program);
+  PLC_STATEMENT(32);
+  ++other_program.cycles;
+  PLC_STATEMENT(33);
+  (void)other_program.cycles;
+}
+
+static void CDECL run_edge(void) {
+  PLC_ENTER(edge, &edge_program);
+  PLC_STATEMENT(42);
+  ++edge_program.runs;
+  *(int*)edge_output = edge_program.runs;
+}
+
+static int declare_pous(void) {
+  return plc_debug_declare_pou(&twice) == ERR_OK && plc_debug_declare_pou(&counter) == ERR_OK &&
+         plc_debug_declare_pou(&main_pou) == ERR_OK && plc_debug_declare_pou(&other) == ERR_OK &&
+         plc_debug_declare_pou(&edge) == ERR_OK &&
+         plc_debug_declare_instance(&main_pou, &main_program, "Main") == ERR_OK &&
+         plc_debug_declare_instance(&counter, &main_program.counter, "Main.counter") == ERR_OK &&
+         plc_debug_declare_instance(&other, &other_program, "Other") == ERR_OK;
+}
+
+static int declare_output(const char* name, unsigned int flags, const char* task, void** address) {
+  Plc_Area_Use use = {task, 0, 0, address};
+  Plc_Area area = {sizeof area, PLC_AREA_OUTPUT | flags, name, sizeof(int), 1, &use, 0, 0, 0};
+  return plc_declare_area(&area, NULL) != RTS_INVALID_HANDLE;
+}
+
+static void set_task(Task_Info* task, const char* name, short kind, short priority, void(CDECL* run)(void)) {
+  strcpy(task->stName, name);
+  task->KindOfTask = kind;
+  task->nPriority = priority;
+  task->dwTaskEntryFunctionPointer = run;
+}
+
+int CDECL plc_app_init(void) {
+  static Task_Info tasks[3];
+  static sys_setup_tasks_struct setup;
+  main_program.counter.step = 1;
+  set_task(&tasks[0], "Main", Cyclic, 2, run_main);
+  tasks[0].dwInterval = 10;
+  set_task(&tasks[1], "Other", Cyclic, 1, run_other);
+  tasks[1].dwInterval = 5;
+  set_task(&tasks[2], "Edge", External, 0, run_edge);
+  strcpy(tasks[2].stExternalEvent, "edge");
+  strcpy(setup.stApplicationName, "Steps");
+  setup.nTasks = 3;
+  setup.ptaskinfo = tasks;
+  if (!declare_pous()) return 1;
+  if (!declare_output("main", 0, "Main", &main_output) ||
+      !declare_output("edge", 0x8000, "Edge", &edge_output))
+    return 3;
+  PLC_DECLARE_VARIABLE("Main.cycles", PLC_TYPE_DINT, main_program.cycles);
+  PLC_DECLARE_VARIABLE("Main.doubled", PLC_TYPE_DINT, main_program.doubled);
+  PLC_DECLARE_VARIABLE("Main.go", PLC_TYPE_BOOL, main_program.go);
+  PLC_DECLARE_VARIABLE("Main.counter.step", PLC_TYPE_INT, main_program.counter.step);
+  PLC_DECLARE_VARIABLE("Main.counter.n", PLC_TYPE_DINT, main_program.counter.n);
+  PLC_DECLARE_VARIABLE("Other.cycles", PLC_TYPE_DINT, other_program.cycles);
+  PLC_DECLARE_VARIABLE("Edge.runs", PLC_TYPE_DINT, edge_program.runs);
+  __sys__setup__tasks(&setup);
+  return SchedRegisterExternalEvent("edge", NULL) != RTS_INVALID_HANDLE ? 0 : 2;
+}

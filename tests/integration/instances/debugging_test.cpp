@@ -1,0 +1,218 @@
+// The application of a real plc-instance is debugged: by the commands that its debugger sends.
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/integration/instances/debugged_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+class DebuggingByHand : public Debugging {
+ protected:
+  DebuggingByHand() { start(application("steps")); }
+};
+
+TEST_F(DebuggingByHand, HaltsOnlyTheTaskThatComesToABreakpoint) {
+  attach();
+  const json set = command("break Counter:13");
+  EXPECT_EQ(set.value("line", 0), 14);
+  EXPECT_EQ(set.value("file", ""), "src/steps.st");
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  EXPECT_EQ(stack("Main"), "Counter:14 Main:23");
+  EXPECT_EQ(task("Main")["stack"][0].value("instance", ""), "Main.counter");
+  EXPECT_EQ(task("Main").value("reason", ""), "breakpoint");
+  EXPECT_TRUE(goes_on("Other"));
+  command("delete *");
+  command("continue Main");
+  EXPECT_TRUE(goes_on("Main"));
+}
+
+TEST_F(DebuggingByHand, ReadsAndWritesValuesOfOneMomentWhileATaskHalts) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  const ValueReply reply =
+      values_->ask(values_->elements({"Main.cycles", "Main.counter.n", "Main.counter.step"}));
+  EXPECT_TRUE(reply.consistent);
+  const ControlReply written = process_->ask(ControlVerb::write_variable, "Main.counter.n=500");
+  EXPECT_EQ(written.code, ErrorCode::ok) << written.text;
+  EXPECT_EQ(stack_after("next"), "Main:26");
+  EXPECT_EQ(values_->read("Main.doubled"), "1000");
+}
+
+TEST_F(DebuggingByHand, StepsIntoOverAndOut) {
+  attach();
+  command("break Main:22");
+  ASSERT_TRUE(halts("Main"));
+  command("delete *");
+  EXPECT_EQ(stack_after("next"), "Main:23");
+  EXPECT_EQ(stack_after("step"), "Counter:12 Main:23");
+  EXPECT_EQ(stack_after("next"), "Counter:14 Main:23");
+  EXPECT_EQ(stack_after("out"), "Main:24");
+  EXPECT_EQ(stack_after("step"), "Twice:2 Main:24");
+  EXPECT_EQ(stack_after("out"), "Main:26");
+  EXPECT_EQ(stack_after("next"), "Main:22");  // of the next cycle
+  command("until Main steps.st:26");
+  EXPECT_TRUE(eventually([&] { return stack("Main") == "Main:26"; }));
+  EXPECT_EQ(stack_after("out"), "Main:22");
+}
+
+TEST_F(DebuggingByHand, KeepsConditionsAndCounts) {
+  attach();
+  command("break Counter:14 hits =3 if step > 0 AND NOT (n < 10) AND Main.go");
+  ASSERT_TRUE(halts("Main"));
+  EXPECT_EQ(state()["breakpoints"][0].value("hits", 0), 3);
+  EXPECT_GE(std::stoi(values_->read("Main.counter.n")), 12);
+  command("continue Main");
+  EXPECT_TRUE(goes_on("Main"));
+  EXPECT_THAT(refused("break Counter:14 if speed > 3"), HasSubstr("speed"));
+  EXPECT_THAT(refused("break Counter:14 if n >"), HasSubstr("ends too early"));
+  EXPECT_THAT(refused("break Counter:15"), HasSubstr("its last is in line 14"));
+  EXPECT_THAT(refused("break Nothing:3"), HasSubstr("Main"));
+  EXPECT_THAT(refused("break Main:22 hits x"), HasSubstr("%N"));
+  EXPECT_THAT(refused("dance"), HasSubstr("until TASK PLACE"));
+}
+
+TEST_F(DebuggingByHand, WritesLogPointsAndHaltsNot) {
+  attach();
+  command("break Counter:14 hits %5 log n is {n} of {Main.cycles}");
+  EXPECT_TRUE(eventually([&] { return !state()["log"].empty(); }));
+  EXPECT_THAT(state()["log"][0].value("text", ""), HasSubstr("n is "));
+  EXPECT_EQ(task("Main").value("state", ""), "runs");
+  EXPECT_EQ(task("Main").value("halts", 0), 0);
+}
+
+TEST_F(DebuggingByHand, CountsReleasesOfAHaltAsNoLostCycles) {
+  attach();
+  const auto before = lost("Main");
+  const auto longest = process_->task("Main")->counters.exec_max_ns;
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  command("delete *");
+  command("continue Main");
+  ASSERT_TRUE(goes_on("Main"));
+  EXPECT_GE(task("Main").value("releases_halted", 0), 30);
+  EXPECT_GE(task("Main").value("halted_ms", 0), 390);
+  EXPECT_LT(lost("Main") - before, 20);
+  EXPECT_LT(process_->task("Main")->counters.exec_max_ns, longest + 300'000'000);
+}
+
+TEST_F(DebuggingByHand, HaltsAllTasksIfItIsSaid) {
+  attach();
+  command("halts all");
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  ASSERT_TRUE(halts("Other"));
+  EXPECT_EQ(task("Other").value("reason", ""), "pause");
+  command("delete *");
+  command("continue *");
+  EXPECT_TRUE(goes_on("Main"));
+  EXPECT_TRUE(goes_on("Other"));
+}
+
+TEST_F(DebuggingByHand, PausesAtTheNextStatement) {
+  attach();
+  command("pause Other");
+  ASSERT_TRUE(halts("Other"));
+  EXPECT_EQ(task("Other").value("reason", ""), "pause");
+  EXPECT_TRUE(goes_on("Main"));
+}
+
+TEST_F(DebuggingByHand, LetsTasksGoWhenTheDebuggerLeaves) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  EXPECT_EQ(debug("attach").code, ErrorCode::busy);
+  command("detach");
+  EXPECT_TRUE(goes_on("Main"));
+  EXPECT_TRUE(state()["breakpoints"].empty());
+  EXPECT_THAT(refused("pause Main"), HasSubstr("is over"));
+  EXPECT_THAT(process_->log(), HasSubstr("1 halted tasks go on"));
+}
+
+TEST_F(DebuggingByHand, LetsTasksGoWhenTheDebuggerIsSilent) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  session_ = 0;  // looks without being the debugger
+  EXPECT_TRUE(eventually([&] { return state().value("session", 1) == 0; }));
+  EXPECT_TRUE(goes_on("Main"));
+  EXPECT_THAT(process_->log(), HasSubstr("its debugger was silent for 10 s"));
+}
+
+TEST_F(DebuggingByHand, StopsAndStartsAHaltedTask) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  const ControlReply stopped = process_->ask(ControlVerb::stop);
+  EXPECT_EQ(stopped.code, ErrorCode::ok) << stopped.text;
+  EXPECT_THAT(stopped.text, HasSubstr("1 halted tasks were let go first"));
+  EXPECT_EQ(process_->ask(ControlVerb::start).code, ErrorCode::ok);
+  EXPECT_TRUE(halts("Main"));
+  EXPECT_EQ(process_->end(SIGTERM), 0);
+}
+
+TEST_F(DebuggingByHand, IgnoresTasksOfExternalEventsUnderOtherSchedulers) {
+  attach();
+  EXPECT_EQ(command("break Edge").value("remark", "x"), "");
+  PoolEvent edge = process_->event("edge");
+  edge.post();
+  ASSERT_TRUE(halts("Edge"));
+  const ControlReply switched = process_->ask(ControlVerb::set_scheduler, "CmpScheduleTimer");
+  EXPECT_THAT(switched.text, HasSubstr("1 halted tasks were let go first"));
+  EXPECT_EQ(task("Edge").value("state", ""), "ignored");
+  EXPECT_THAT(command("break Edge:42").value("remark", ""), HasSubstr("Edge"));
+  const auto before = cycles("Edge");
+  edge.post();
+  EXPECT_TRUE(eventually([&] { return cycles("Edge") == before + 1; }));
+}
+
+TEST_F(DebuggingByHand, TakesAnotherVersionWhileATaskHalts) {
+  attach();
+  command("break Counter:14");
+  ASSERT_TRUE(halts("Main"));
+  const ControlReply changed = process_->ask(ControlVerb::change_application, application("steps"));
+  EXPECT_EQ(changed.code, ErrorCode::ok) << changed.text;
+  EXPECT_THAT(changed.text, HasSubstr("1 halted tasks were let go first"));
+  EXPECT_TRUE(halts("Main"));  // at the breakpoint in the new version
+  EXPECT_EQ(stack("Main"), "Counter:14 Main:23");
+}
+
+TEST_F(DebuggingByHand, TellsOfWatchdogsNothing) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  std::this_thread::sleep_for(std::chrono::seconds(4));  // longer than the guard against endless loops
+  EXPECT_EQ(task("Main").value("state", ""), "halted");
+  command("delete *");
+  command("continue *");
+  EXPECT_TRUE(goes_on("Main"));
+  EXPECT_TRUE(process_->runtime().running);
+}
+
+TEST(DebugBuild, IsRefusedWhereItIsNotAllowed) {
+  const Sandbox sandbox;
+  InstanceProcess process(sandbox, {"--application", application("steps"), "--no-debug"});
+  EXPECT_EQ(process.end(), 3);
+  EXPECT_THAT(process.log(), HasSubstr("allow_debug = false"));
+}
+
+TEST(DebugBuild, IsNoneWithoutTheMacros) {
+  const Sandbox sandbox;
+  InstanceProcess process(sandbox, {"--application", application("seen"), "--no-debug"});
+  process.wait_until_up(true);
+  const ControlReply reply = process.ask(ControlVerb::debug, "attach");
+  EXPECT_EQ(reply.code, ErrorCode::unsupported);
+  EXPECT_THAT(reply.text, HasSubstr("--debug"));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""A client of the Debug Adapter Protocol for debugging_over_dap.sh: dap_client.py PORT story|garbage|vanish"""
+import json
+import socket
+import sys
+
+PATIENCE = 30
+
+
+class Client:
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
+        self.pending = b""
+        self.sequence = 0
+        self.events = []
+
+    def receive(self):
+        while b"\r\n\r\n" not in self.pending:
+            self.pending += self.more()
+        head, rest = self.pending.split(b"\r\n\r\n", 1)
+        length = int(head.split(b":")[1])
+        while len(rest) < length:
+            rest += self.more()
+        self.pending = rest[length:]
+        return json.loads(rest[:length])
+
+    def more(self):
+        data = self.socket.recv(65536)
+        if not data:
+            raise EOFError
+        return data
+
+    def ask(self, command, expect=True, **arguments):
+        self.sequence += 1
+        body = json.dumps({"seq": self.sequence, "type": "request", "command": command, "arguments": arguments})
+        self.socket.sendall(f"Content-Length: {len(body)}\r\n\r\n{body}".encode())
+        while True:
+            message = self.receive()
+            if message["type"] == "event":
+                self.events.append(message)
+                continue
+            assert message["request_seq"] == self.sequence and message["command"] == command, message
+            assert message["success"] == expect, message
+            return message.get("body", {})
+
+    def event(self, name):
+        while True:
+            for message in self.events:
+                if message["event"] == name:
+                    self.events.remove(message)
+                    return message["body"]
+            message = self.receive()
+            assert message["type"] == "event", message
+            self.events.append(message)
+
+
+def attached(port):
+    client = Client(port)
+    assert client.ask("initialize", adapterID="test")["supportsConditionalBreakpoints"]
+    client.ask("stackTrace", expect=False, threadId=1)
+    client.ask("attach")
+    client.event("initialized")
+    return client
+
+
+def stack(client, thread):
+    return client.ask("stackTrace", threadId=thread)["stackFrames"]
+
+
+def story(port):
+    client = attached(port)
+    made = client.ask("setBreakpoints", source={"path": "/engineer/src/steps.st"},
+                      breakpoints=[{"line": 13, "condition": "n > 3"}, {"line": 900}])["breakpoints"]
+    assert made[0]["verified"] and made[0]["line"] == 14, made
+    assert not made[1]["verified"] and "statement" in made[1]["message"], made
+    client.ask("setExceptionBreakpoints", filters=[])
+    client.ask("configurationDone")
+    threads = {one["name"]: one["id"] for one in client.ask("threads")["threads"]}
+    assert set(threads) == {"Main", "Other", "Edge"}, threads
+    main = threads["Main"]
+
+    hit = client.event("stopped")
+    assert hit["reason"] == "breakpoint" and hit["threadId"] == main and hit["allThreadsStopped"] is False, hit
+    frames = stack(client, main)
+    assert [(one["name"], one["line"]) for one in frames] == [("Counter", 14), ("Main", 23)], frames
+    assert frames[0]["source"]["name"] == "steps.st", frames
+
+    scope = client.ask("scopes", frameId=frames[0]["id"])["scopes"][0]
+    values = {one["name"]: one for one in client.ask("variables", variablesReference=scope["variablesReference"])["variables"]}
+    assert set(values) == {"n", "step"} and values["step"]["value"] == "1", values
+    changed = client.ask("setVariable", variablesReference=scope["variablesReference"], name="n", value="1000")
+    assert changed["value"] == "1000", changed
+    client.ask("setVariable", expect=False, variablesReference=scope["variablesReference"], name="step", value="40000")
+    assert client.ask("evaluate", expression="n", frameId=frames[0]["id"])["result"] == "1000"
+    assert client.ask("evaluate", expression="step := 2", frameId=frames[0]["id"], context="repl")["result"] == "2"
+
+    client.ask("stepOut", threadId=main)
+    assert client.event("stopped")["reason"] == "step"
+    assert stack(client, main)[0]["line"] == 24
+    assert client.ask("evaluate", expression="Main.counter.n")["result"] == "1002"
+    client.ask("evaluate", expression="Main.counter.step := 1", context="repl")  # as the next story expects it
+    client.ask("stepIn", threadId=main)
+    client.event("stopped")
+    assert [one["name"] for one in stack(client, main)] == ["Twice", "Main"]
+    client.ask("setBreakpoints", source={"path": "/engineer/src/steps.st"}, breakpoints=[])
+    assert client.ask("continue", threadId=main)["allThreadsContinued"] is False
+
+    client.ask("pause", threadId=threads["Other"])
+    hit = client.event("stopped")
+    assert hit["reason"] == "pause" and hit["threadId"] == threads["Other"], hit
+    client.ask("next", threadId=threads["Other"])
+    client.event("stopped")
+    made = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Twice"}, {"name": "Thrice"}])["breakpoints"]
+    assert made[0]["verified"] and not made[1]["verified"], made
+    client.event("stopped")
+    client.ask("disconnect")
+
+
+def garbage(port):
+    for bytes_ in (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"Content-Length: 99999999999\r\n\r\n", b"Content-Length: 3\r\n\r\n{}}",
+                   b"\0" * 5000, b"Content-Length: 4\r\n\r\n[[]]",
+                   b'Content-Length: 1000005\r\n\r\n{"a":' + b"[" * 500000 + b"]" * 499999 + b"}"):
+        client = Client(port)
+        client.socket.sendall(bytes_)
+        try:
+            while True:
+                client.receive()
+        except (EOFError, ConnectionError):
+            pass
+
+
+def vanish(port):
+    client = attached(port)
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Main"}])
+    client.event("stopped")
+    client.socket.close()
+
+
+{"story": story, "garbage": garbage, "vanish": vanish}[sys.argv[2]](int(sys.argv[1]))

@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# An engineer finds out what a running program does: with commands, and with a client of the Debug Adapter Protocol. The
+# neighbour on the same host loses no cycle by it.
+. "$(dirname "$0")/common.sh"
+
+write_host cell $(seq "$first_core" "$last_core")
+write_instance cell line1 "$first_core" steps 'share_core = true'
+write_instance cell line2 "$last_core" bottling_line 'share_core = true'
+start_manager cell
+until_true 20 state_is line1 running
+until_true 20 state_is line2 running
+
+echo "- commands, each an argument"
+plcctl debug line1 'break Counter:14 if n > 5' wait stack 'print n' 'set n = 100' next print quit >"$cell/commands.txt" ||
+  fail "$(cat "$cell/commands.txt")"
+grep -q 'task Main halts: breakpoint 1 at Counter:14 (src/steps.st)  Main.counter' "$cell/commands.txt" || fail "$(cat "$cell/commands.txt")"
+grep -q '#1 Main:23' "$cell/commands.txt" || fail "$(cat "$cell/commands.txt")"
+grep -q 'Main.counter.n = 100' "$cell/commands.txt" || fail "$(cat "$cell/commands.txt")"
+grep -q 'task Main halts: step at Main:24' "$cell/commands.txt" || fail "$(cat "$cell/commands.txt")"
+runs_on() { local before; before=$(task line1/Main cycles); sleep 1.2; [ "$(task line1/Main cycles)" -gt "$before" ]; }
+until_true 10 runs_on
+
+echo "- lines of standard input"
+printf 'pause Other\nwait\ntasks\nquit\n' | plcctl debug line1 >"$cell/lines.txt" || fail "$(cat "$cell/lines.txt")"
+grep -q 'task Other halts: pause at Other:' "$cell/lines.txt" || fail "$(cat "$cell/lines.txt")"
+
+echo "- commands that are refused"
+refused "is no debug build" plcctl debug line2 tasks
+refused "no POU" plcctl debug line1 'break Nothing:3'
+refused "'help' lists them" plcctl debug line1 dance
+
+echo "- one engineer's story over the Debug Adapter Protocol"
+"$BIN/plcctl" --timeout 10 debug line1 --dap 0 >"$cell/dap.txt" 2>"$cell/dap.log" &
+others+=($!)
+has_port() { grep -qE '127.0.0.1:[0-9]+' "$cell/dap.txt"; }
+until_true 20 has_port
+port=$(grep -oE '127.0.0.1:[0-9]+' "$cell/dap.txt" | cut -d: -f2)
+story() { python3 "$(dirname "$0")/dap_client.py" "$port" story || fail "the story over DAP"; }
+costs_no_cycle line2/Fill story
+until_true 10 runs_on
+
+echo "- garbage on the port ends that connection, and nothing else"
+python3 "$(dirname "$0")/dap_client.py" "$port" garbage || fail "garbage"
+python3 "$(dirname "$0")/dap_client.py" "$port" story || fail "the story after garbage"
+
+echo "- a client that vanishes: its breakpoints go, and the task goes on"
+python3 "$(dirname "$0")/dap_client.py" "$port" vanish || fail "vanish"
+until_true 10 runs_on
+
+echo "- a debugger that is killed: the same, after its lease"
+plcctl debug line1 'break Main:24' wait 'wait 600' >"$cell/killed.txt" 2>&1 &
+others+=($!)
+halted() { grep -q 'task Main halts' "$cell/killed.txt"; }
+until_true 20 halted
+pkill -KILL -P $! 2>/dev/null || kill -KILL $!
+until_true 30 runs_on
+plcctl logs line1 | grep -q 'its debugger was silent for 10 s' || fail "$(plcctl logs line1)"
+
+kill -TERM "${managers[-1]}"
+wait "${managers[-1]}" || fail "the manager ended with $?"
+managers=()
+nothing_left

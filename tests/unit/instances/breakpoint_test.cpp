@@ -1,0 +1,230 @@
+#include "instances/runtime/debug/breakpoint.hpp"
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "instances/runtime/debug/debug_answer.hpp"
+#include "instances/runtime/debug/debug_value.hpp"
+#include "instances/runtime/debug/step_rule.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+/// The variables of a POU, of which there are two instances, and a global one.
+struct MotorData {
+  std::int16_t speed = 0;
+  std::uint8_t on = 0;
+  std::int64_t total = 0;
+};
+
+class BreakpointConditions : public testing::Test {
+ protected:
+  Result<ValuePlace> find(std::string_view name) {
+    const auto own = [&](VariableType type, std::uint32_t bytes, std::ptrdiff_t offset) {
+      return ValuePlace{.type = type, .bytes = bytes, .of_self = true, .address = nullptr, .offset = offset};
+    };
+    if (name == "speed") return own(VariableType::int_, 2, offsetof(MotorData, speed));
+    if (name == "on") return own(VariableType::bool_, 1, offsetof(MotorData, on));
+    if (name == "total") return own(VariableType::lint, 8, offsetof(MotorData, total));
+    if (name == "limit") {
+      return ValuePlace{
+          .type = VariableType::lreal, .bytes = 8, .address = reinterpret_cast<const std::byte*>(&limit_)};
+    }
+    if (name == "label") return own(VariableType::string, 8, 0);
+    return failure(ErrorCode::not_found, "no variable '" + std::string(name) + "'");
+  }
+  Result<Condition> parse(std::string_view text) {
+    return Condition::parse(text, [this](std::string_view name) { return find(name); });
+  }
+  bool holds(std::string_view text, const MotorData& data) {
+    const auto made = parse(text);
+    EXPECT_TRUE(made) << text << ": " << made.error().describe();
+    return made && made->holds(&data);
+  }
+  std::string fault(std::string_view text) {
+    const auto made = parse(text);
+    return made ? "" : made.error().message;
+  }
+
+  double limit_ = 7.5;
+};
+
+TEST_F(BreakpointConditions, CompareVariablesOfTheirFrame) {
+  const MotorData slow{.speed = 5, .on = 1, .total = 9'007'199'254'740'993};
+  const MotorData fast{.speed = 10, .on = 0, .total = -1};
+  EXPECT_TRUE(holds("speed = 5", slow));
+  EXPECT_FALSE(holds("speed = 5", fast));
+  EXPECT_TRUE(holds("speed <> 5", fast));
+  EXPECT_TRUE(holds("speed<limit", slow));
+  EXPECT_TRUE(holds("speed >= limit", fast));
+  EXPECT_TRUE(holds("speed <= 16#0A AND speed > -3", fast));
+  EXPECT_TRUE(holds("on", slow));
+  EXPECT_TRUE(holds("NOT on", fast));
+  EXPECT_TRUE(holds("on = TRUE", slow));
+  EXPECT_TRUE(holds("total = 9007199254740993", slow));
+  EXPECT_FALSE(holds("total = 9007199254740992", slow));
+  EXPECT_TRUE(holds("on OR speed = 10 AND total = -1", fast));
+  EXPECT_TRUE(holds("on or (speed = 10)", slow));
+  EXPECT_FALSE(holds("(on OR speed = 10) AND total = -1", slow));
+  EXPECT_TRUE(holds("NOT (on AND speed > 5)", slow));
+}
+
+TEST_F(BreakpointConditions, OfAFunctionHaveNoOwnVariables) {
+  const auto made = parse("speed > 0");
+  ASSERT_TRUE(made);
+  EXPECT_FALSE(made->holds(nullptr));
+}
+
+TEST_F(BreakpointConditions, AreRefused) {
+  EXPECT_THAT(fault(""), HasSubstr("ends too early"));
+  EXPECT_THAT(fault("speed"), HasSubstr("no BOOL"));
+  EXPECT_THAT(fault("speed ="), HasSubstr("ends too early"));
+  EXPECT_THAT(fault("speed = 40000"), HasSubstr("32767"));
+  EXPECT_THAT(fault("speed = other"), HasSubstr("no variable 'other'"));
+  EXPECT_THAT(fault("other = 5"), HasSubstr("no variable 'other'"));
+  EXPECT_THAT(fault("5 = speed"), HasSubstr("no variable"));
+  EXPECT_THAT(fault("label = 'x'"), HasSubstr("string"));
+  EXPECT_THAT(fault("speed == 5"), HasSubstr("no BOOL"));
+  EXPECT_THAT(fault("(on"), HasSubstr("')' is missing"));
+  EXPECT_THAT(fault("on on"), HasSubstr("'on' is not expected"));
+  EXPECT_THAT(fault("on OR"), HasSubstr("ends too early"));
+  EXPECT_THAT(fault(std::string(16, '(') + "on" + std::string(16, ')')), HasSubstr("deeper than 16"));
+  EXPECT_EQ(fault(std::string(15, '(') + "on" + std::string(15, ')')), "");
+  EXPECT_THAT(fault(std::string(201, ' ')), HasSubstr("at most 200"));
+}
+
+TEST(HitRules, CountOnlySomeHits) {
+  const auto rule = [](std::string_view text) { return HitRule::parse(text).value(); };
+  EXPECT_TRUE(HitRule{}.holds(1));
+  EXPECT_FALSE(rule("=3").holds(2));
+  EXPECT_TRUE(rule("=3").holds(3));
+  EXPECT_FALSE(rule("=3").holds(4));
+  EXPECT_TRUE(rule("%3").holds(6));
+  EXPECT_FALSE(rule("% 3").holds(7));
+  EXPECT_FALSE(rule(">=3").holds(2));
+  EXPECT_TRUE(rule(">=3").holds(4));
+  EXPECT_TRUE(rule("3").holds(4));
+  for (const char* const wrong : {"", "=", "0", "%0", "-1", "x", "3x", "==3", "99999999999999999999"})
+    EXPECT_FALSE(HitRule::parse(wrong)) << wrong;
+}
+
+TEST(BreakpointOrders, HaveTheirPartsInOrder) {
+  const auto order = BreakpointOrder::parse(" Main:5 hits %2 if a = 1 AND b log now {a} if so ").value();
+  EXPECT_EQ(order.place, "Main:5");
+  EXPECT_EQ(order.hits, "%2");
+  EXPECT_EQ(order.condition, "a = 1 AND b");
+  EXPECT_EQ(order.log, "now {a} if so");
+  const auto logged = BreakpointOrder::parse("main.st:7 log speed {speed}").value();
+  EXPECT_EQ(logged.log, "speed {speed}");
+  EXPECT_EQ(logged.condition, "");
+  EXPECT_EQ(BreakpointOrder::parse("Main").value().place, "Main");
+  for (const char* const wrong : {"", "  ", "Main 5", "if a", "Main hits"})
+    EXPECT_FALSE(BreakpointOrder::parse(wrong)) << wrong;
+}
+
+TEST_F(BreakpointConditions, AreNoLogTemplates) {
+  const FindValue find = [this](std::string_view name) { return this->find(name); };
+  const auto made = LogTemplate::parse("speed {speed} of { limit }!", find).value();
+  EXPECT_THAT(made.texts, testing::ElementsAre("speed ", " of ", "!"));
+  EXPECT_EQ(made.values.size(), 2U);
+  EXPECT_EQ(LogTemplate::parse("plain", find).value().values.size(), 0U);
+  EXPECT_THAT(LogTemplate::parse("{speed", find).error().message, HasSubstr("'}' is missing"));
+  EXPECT_THAT(LogTemplate::parse("{label}", find).error().message, HasSubstr("string"));
+  EXPECT_THAT(LogTemplate::parse("{other}", find).error().message, HasSubstr("no variable"));
+  EXPECT_THAT(LogTemplate::parse(std::string(201, 'x'), find).error().message, HasSubstr("200"));
+  std::string many;
+  for (std::size_t i = 0; i < LogTemplate::kMaxValues; ++i) many += "{speed}";
+  EXPECT_TRUE(LogTemplate::parse(many, find));
+  EXPECT_THAT(LogTemplate::parse(many + "{speed}", find).error().message, HasSubstr("at most 8 values"));
+}
+
+TEST(BreakpointTables, FindTheBreakpointsOfAStatement) {
+  const auto at = [](std::uint32_t id, std::uint32_t pou, std::uint32_t line) {
+    return std::make_shared<const Breakpoint>(Breakpoint{.id = id,
+                                                         .place = {.pou = pou, .line = line},
+                                                         .order = {},
+                                                         .hit_rule = {},
+                                                         .condition = {},
+                                                         .log = {},
+                                                         .hits = nullptr});
+  };
+  const BreakpointTable sut({at(1, 2, 7), at(2, 0, 3), at(3, 2, 5), at(4, 2, 7)}, 4);
+  const auto ids = [&](std::uint32_t pou, std::uint32_t line) {
+    std::vector<std::uint32_t> found;
+    for (const auto& breakpoint : sut.at(pou, line)) found.push_back(breakpoint->id);
+    return found;
+  };
+  EXPECT_THAT(ids(2, 7), testing::ElementsAre(1, 4));
+  EXPECT_THAT(ids(2, 5), testing::ElementsAre(3));
+  EXPECT_THAT(ids(0, 3), testing::ElementsAre(2));
+  EXPECT_TRUE(ids(0, 4).empty());
+  EXPECT_TRUE(ids(1, 3).empty());
+  EXPECT_TRUE(ids(3, 3).empty());
+  EXPECT_TRUE(ids(4, 3).empty());
+  EXPECT_TRUE(ids(4'000'000'000, 3).empty());
+}
+
+class StepRules : public testing::Test {
+ protected:
+  [[nodiscard]] bool halts(StepRule::Kind kind, std::uint32_t depth, unsigned line, std::uint64_t cycle = 5) {
+    const StepRule rule{.kind = kind, .cycle = 5, .depth = 1, .line = 10, .pou = 0};
+    const Plc_Frame frame{&pou_, nullptr, line, depth, nullptr};
+    return rule.halts_at(frame, cycle);
+  }
+  Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0};
+};
+
+TEST_F(StepRules, HaltWhereTheySay) {
+  using Kind = StepRule::Kind;
+  EXPECT_FALSE(halts(Kind::none, 1, 11));
+  EXPECT_TRUE(halts(Kind::into, 1, 11));
+  EXPECT_TRUE(halts(Kind::into, 2, 10));
+  EXPECT_FALSE(halts(Kind::into, 1, 10));  // another statement of the same line
+  EXPECT_TRUE(halts(Kind::into, 1, 10, 6));
+  EXPECT_TRUE(halts(Kind::over, 1, 11));
+  EXPECT_FALSE(halts(Kind::over, 2, 11));
+  EXPECT_TRUE(halts(Kind::over, 0, 3));
+  EXPECT_TRUE(halts(Kind::over, 2, 11, 6));  // all calls of the cycle have returned
+  EXPECT_FALSE(halts(Kind::out, 1, 11));
+  EXPECT_TRUE(halts(Kind::out, 0, 11));
+  EXPECT_TRUE(halts(Kind::out, 1, 11, 6));
+  EXPECT_TRUE(halts(Kind::until, 4, 10));
+  EXPECT_FALSE(halts(Kind::until, 1, 11));
+}
+
+TEST(DebugNumbers, OfDatesAreNanosecondsInEachForm) {
+  const std::int64_t days = 3;
+  const std::int64_t nanoseconds = days * 86'400'000'000'000;
+  const std::array<std::int64_t, 2> timespec{days * 86'400, 0};
+  const DebugNumber date = number_of(VariableType::date, std::as_bytes(std::span(&nanoseconds, 1)));
+  EXPECT_EQ(number_of(VariableType::days_date, std::as_bytes(std::span(&days, 1))), date);
+  EXPECT_EQ(number_of(VariableType::timespec_date, std::as_bytes(std::span(timespec))), date);
+}
+
+TEST(DebugAnswer, IsNoLongerThanAReply) {
+  const auto answer = [](std::size_t file, std::size_t remark) {
+    return nlohmann::json{{"id", 4'294'967'295U},
+                          {"pou", std::string(63, 'p')},
+                          {"file", std::string(file, '"')},
+                          {"line", 4'294'967'295U},
+                          {"remark", std::string(remark, 'r')}};
+  };
+  EXPECT_EQ(nlohmann::json::parse(debug_answer(answer(20, 100))), answer(20, 100));
+  EXPECT_FALSE(nlohmann::json::parse(debug_answer(answer(255, 100))).contains("file"));
+  EXPECT_LE(debug_answer(answer(255, 600)).size(), kMaxDebugAnswer);
+  EXPECT_THAT(debug_answer(answer(255, 600)), HasSubstr("ignored"));
+}
+
+}  // namespace
+}  // namespace plchost
