@@ -151,8 +151,12 @@ void ManagedInstance::tell_starvation() {
 }
 
 void ManagedInstance::watch_set_up() {
-  (void)starved_now();
+  const bool starved = starved_now();
   tell_starvation();
+  if (step_ != SetupStep::start_scheduler) return;
+  // From here on tasks run: one of them can be caught with a lock that the rest of the set-up takes.
+  heartbeat_.look(surroundings_.now(), signs_, starved);
+  if (heartbeat_.silent() && !host_.keep_lost_faults().empty()) come_up();
 }
 
 void ManagedInstance::set_up_timed_out() {

@@ -1,3 +1,4 @@
+// A DapSession's breakpoints, stacks and steps; its values are in dap_values.cpp.
 #include "api/cli/debug/dap_session.hpp"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "api/dds/text.hpp"
+#include "api/cli/debug/foreign_json.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -16,18 +17,6 @@ using Json = nlohmann::json;
 
 // Of the source of functions' breakpoints: no path.
 constexpr const char* kFunctions = "";
-// A frame's number: the thread's, and the place in its stack.
-constexpr std::int64_t kFramesOfThread = 1000;
-
-std::int64_t number_in(const Json& arguments, const char* key) {
-  const auto found = arguments.find(key);
-  return found != arguments.end() && found->is_number_integer() ? found->get<std::int64_t>() : 0;
-}
-
-std::string text_in(const Json& arguments, const char* key) {
-  const auto found = arguments.find(key);
-  return found != arguments.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
 
 Json list_in(const Json& arguments, const char* key) {
   const auto found = arguments.find(key);
@@ -36,17 +25,6 @@ Json list_in(const Json& arguments, const char* key) {
 
 std::string last_name(std::string_view path) {
   return std::string(path.substr(path.find_last_of("/\\") + 1));
-}
-
-Json variable_json(const plc_VariableRecord& variable, std::string_view prefix) {
-  std::string name(dds::text_of(variable.name));
-  const std::string whole = name;
-  if (name.size() > prefix.size() && name.starts_with(prefix)) name.erase(0, prefix.size());
-  return {{"name", name},
-          {"evaluateName", whole},
-          {"value", dds::text_of(variable.value)},
-          {"type", dds::text_of(variable.type)},
-          {"variablesReference", 0}};
 }
 
 }  // namespace
@@ -207,80 +185,6 @@ DapSession::Answer DapSession::stack(const Json& arguments) {
   }
   const std::size_t total = frames.size();
   return Json{{"stackFrames", std::move(frames)}, {"totalFrames", total}};
-}
-
-std::string DapSession::instance_of(std::int64_t frame) const {
-  const auto thread = static_cast<std::size_t>(frame / kFramesOfThread);
-  const auto place = static_cast<std::size_t>(frame % kFramesOfThread);
-  if (frame <= 0 || thread < 1 || thread > tasks_.size()) return {};
-  for (const Json& task : state_.value("tasks", Json::array())) {
-    if (task.value("task", "") != tasks_[thread - 1]) continue;
-    const Json stack = task.value("stack", Json::array());
-    return place < stack.size() ? stack[place].value("instance", "") : std::string();
-  }
-  return {};
-}
-
-// The variables of a frame have its number.
-DapSession::Answer DapSession::scopes(const Json& arguments) {
-  const std::int64_t frame = number_in(arguments, "frameId");
-  const std::string instance = instance_of(frame);
-  Json scopes = Json::array();
-  if (!instance.empty()) {
-    scopes.push_back({{"name", instance},
-                      {"variablesReference", frame},
-                      {"expensive", false},
-                      {"presentationHint", "locals"}});
-  }
-  return Json{{"scopes", std::move(scopes)}};
-}
-
-DapSession::Answer DapSession::variables(const Json& arguments) {
-  const std::string instance = instance_of(number_in(arguments, "variablesReference"));
-  Json made = Json::array();
-  if (!instance.empty()) {
-    auto found = link_.variables(instance + ".*");
-    if (!found && found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
-    if (found) {
-      for (const auto& variable : *found) made.push_back(variable_json(variable, instance + "."));
-    }
-  }
-  return Json{{"variables", std::move(made)}};
-}
-
-DapSession::Answer DapSession::written(const std::string& instance, const std::string& name,
-                                       const std::string& value) {
-  PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(instance, name));
-  const std::string whole(dds::text_of(variable.name));
-  PLCHOST_TRY(link_.write(fmt::format("{}={}", whole, value)));
-  PLCHOST_TRY_ASSIGN(const auto now, link_.variable("", whole));
-  return variable_json(now, "");
-}
-
-DapSession::Answer DapSession::set_variable(const Json& arguments) {
-  return written(instance_of(number_in(arguments, "variablesReference")), text_in(arguments, "name"),
-                 text_in(arguments, "value"));
-}
-
-// A name, or in the debug console "NAME := VALUE".
-DapSession::Answer DapSession::evaluate(const Json& arguments) {
-  std::string expression = text_in(arguments, "expression");
-  const std::string instance = instance_of(number_in(arguments, "frameId"));
-  const auto trim = [](std::string text) {
-    const auto first = text.find_first_not_of(' ');
-    if (first == std::string::npos) return std::string();
-    return text.substr(first, text.find_last_not_of(' ') - first + 1);
-  };
-  const std::size_t assign = expression.find(":=");
-  Answer made = Json();
-  if (assign != std::string::npos && text_in(arguments, "context") == "repl") {
-    made = written(instance, trim(expression.substr(0, assign)), trim(expression.substr(assign + 2)));
-  } else {
-    PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(instance, trim(expression)));
-    made = variable_json(variable, "");
-  }
-  if (!made) return made;
-  return Json{{"result", (*made)["value"]}, {"type", (*made)["type"]}, {"variablesReference", 0}};
 }
 
 DapSession::Answer DapSession::go_on(const std::string& command, const Json& arguments) {

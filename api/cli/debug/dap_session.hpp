@@ -34,6 +34,8 @@ class DapSession {
  private:
   using Json = nlohmann::json;
   using Answer = Result<Json>;  ///< the body
+  /// A frame's number: the thread's, and the place in its stack.
+  static constexpr std::int64_t kFramesOfThread = 1000;
 
   [[nodiscard]] Answer carry_out(const std::string& command, const Json& arguments);
   [[nodiscard]] Answer attach();

@@ -31,4 +31,14 @@ std::optional<nlohmann::json> object_in(std::string_view text) {
   return object;
 }
 
+std::int64_t number_in(const nlohmann::json& arguments, const char* key) {
+  const auto found = arguments.find(key);
+  return found != arguments.end() && found->is_number_integer() ? found->get<std::int64_t>() : 0;
+}
+
+std::string text_in(const nlohmann::json& arguments, const char* key) {
+  const auto found = arguments.find(key);
+  return found != arguments.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
 }  // namespace plchost

@@ -12,6 +12,8 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
 using testing::StartsWith;
 
 TEST(HeartbeatWatch, IsSilentWhenTheBeatStandsStillForTheLimit) {
@@ -244,6 +246,37 @@ TEST_F(SilentProcess, SaysTheFaultThatTheProcessCouldNotTell) {
   host_.lost_fault = "task 'Main': SIGABRT: abort";
   bring_up_and_fall_silent();
   EXPECT_THAT(problem(), StartsWith("task 'Main': SIGABRT: abort; its control thread has not"));
+}
+
+// Its first cycle aborts with the lock of the heap, and its control thread wants memory before it says that
+// it is up.
+TEST_F(SilentProcess, IsInExceptionIfATaskIsCaughtBeforeItIsUp) {
+  for (const bool caught : {true, false}) {
+    make();
+    host_.lost_fault = caught ? "task 'Main': SIGABRT: abort" : "";
+    sut().hold("is to be started");
+    sut().release();
+    fall_silent();
+    EXPECT_EQ(state(), InstanceState::starting)
+        << "no task runs before that step: such a fault is an older one";
+    sut().on_report({.step = SetupStep::make_tasks, .code = ErrorCode::ok, .text = ""});
+    fall_silent();
+    EXPECT_EQ(state(), caught ? InstanceState::exception : InstanceState::starting);
+  }
+  EXPECT_EQ(problem(), "");
+  expire_timer();
+  EXPECT_THAT(host_.signals, Not(IsEmpty())) << "nothing but time says that this set-up has failed";
+}
+
+TEST_F(SilentProcess, OfWhichATaskIsCaughtBeforeItIsUpIsReset) {
+  host_.lost_fault = "task 'Main': SIGABRT: abort";
+  sut().hold("is to be started");
+  sut().release();
+  sut().on_report({.step = SetupStep::make_tasks, .code = ErrorCode::ok, .text = ""});
+  fall_silent();
+  EXPECT_THAT(problem(), StartsWith("task 'Main': SIGABRT: abort; its control thread has not"));
+  ask(ControlVerb::reset);
+  EXPECT_THAT(host_.signals, ElementsAre(SIGTERM)) << "it cannot be asked to end";
 }
 
 TEST_F(SilentProcess, IsWhatItWasWhenItAnswersAgain) {
