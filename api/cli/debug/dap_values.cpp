@@ -1,4 +1,4 @@
-// What a DapSession shows and writes: the variables of the frames of halted tasks.
+// A DapSession's variables: those of the frames of halted tasks.
 #include <fmt/format.h>
 
 #include "api/cli/debug/dap_session.hpp"
