@@ -68,9 +68,9 @@ class SafeOutputs {
   void task_rests(std::size_t task) noexcept;
   /// The task alone is in exception, and never publishes again. Control thread.
   void task_fails(std::size_t task) noexcept;
-  /// A debugger halts the tasks of which `is_halted` is true. Blocks that they write are safe until none of them
-  /// halts any more, and a cycle has ended then. Control thread, while each of those tasks stands still, and
-  /// before it goes on.
+  /// A debugger halts the tasks of which `is_halted` is true. Blocks that they write are safe until none of
+  /// them halts any more, and a cycle has ended then. Control thread, while each of those tasks stands still,
+  /// and before it goes on.
   void halt(const std::function<bool(std::size_t task)>& is_halted) noexcept;
   /// Now and then: gives a sign to terminals, and writes safe values again that a task may have written over.
   /// Control thread.
