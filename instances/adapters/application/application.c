@@ -92,6 +92,7 @@ int CDECL plc_app_init(void) {
   strncpy(setup.stApplicationName, plchost_application_name, sizeof setup.stApplicationName - 1);
   setup.ptaskinfo = infos;
   __sys__setup__tasks(&setup);
+  if (plchost_scheduler[0] != 0 && plc_prefer_scheduler(plchost_scheduler) != ERR_OK) return 1;
   for (i = 0; i < plchost_task_count; ++i) {
     if (!set_options(&plchost_tasks[i]) || !register_event(&plchost_tasks[i])) return 1;
   }

@@ -94,6 +94,7 @@ struct plchost_symbol {
 
 /* From the file that plcctl writes. */
 extern const char plchost_application_name[];
+extern const char plchost_scheduler[]; /* that it is made for; empty: any */
 extern const unsigned int plchost_task_count;
 extern const struct plchost_task plchost_tasks[];
 extern const unsigned int plchost_place_count;

@@ -41,7 +41,8 @@ GlueWriter::GlueWriter(const Project& project, const Configuration& configuratio
 
 Glue GlueWriter::write() {
   write_head();
-  print("const char plchost_application_name[] = \"{}\";\n", configuration_.name);
+  print("const char plchost_application_name[] = \"{}\";\nconst char plchost_scheduler[] = \"{}\";\n",
+        configuration_.name, resource_.scheduler);
   find_places();
   find_aliases();
   write_storage();

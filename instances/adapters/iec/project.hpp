@@ -78,6 +78,7 @@ struct Resource {
   std::vector<Task> tasks;
   std::vector<Program> programs;
   SourcePlace place;
+  std::string scheduler = {};  ///< that its tasks are made for; empty: any
 };
 
 struct Configuration {

@@ -17,6 +17,7 @@
 
 #include "instances/adapters/iec/duration.hpp"
 #include "instances/adapters/iec/tokens.hpp"
+#include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/toml/section_reader.hpp"
 #include "shm/toml/toml_document.hpp"
@@ -35,8 +36,7 @@ static_assert(std::to_underlying(LatePolicy::asap) == 1);
 static_assert(std::to_underlying(WatchdogPolicy::task) == 1);
 
 constexpr std::string_view kSchedulerIsElsewhere =
-    "the scheduler belongs to the instance, not to the application; set it in [[instance]] of the host's "
-    "configuration, or by plcctl set scheduler";
+    "one scheduler runs all tasks of an instance; write it before the first table, or in [resource.NAME]";
 
 constexpr std::size_t kMostProblems = 100;  // more are not told
 
@@ -100,9 +100,12 @@ class TaskFileReader {
     for (const auto& [key, value] : root) {
       if (key == "resource") {
         read_resources(value);
+      } else if (key == "scheduler") {
+        for (Resource* const resource : resources_) read_scheduler(value, *resource);
       } else if (!read_part(key, value, nullptr)) {
         refuse(key, value,
-               "[task.NAME], [program.NAME], [resource.NAME.task.NAME] and [resource.NAME.program.NAME]");
+               "scheduler, [task.NAME], [program.NAME], [resource.NAME.task.NAME] and "
+               "[resource.NAME.program.NAME]");
       }
     }
   }
@@ -112,27 +115,37 @@ class TaskFileReader {
     return key == "task" || key == "program";
   }
   void refuse(const std::string& key, const TomlValue& value, std::string_view allowed) {
-    problem(value, key == "scheduler"
-                       ? fmt::format("{}: {}", key, kSchedulerIsElsewhere)
-                       : fmt::format("'{}' is not expected here; allowed are {}", shown(key), allowed));
+    problem(value, fmt::format("'{}' is not expected here; allowed are {}", shown(key), allowed));
+  }
+  // That of a resource is read first: it wins.
+  void read_scheduler(const TomlValue& value, Resource& resource) {
+    const auto* const name = std::get_if<std::string>(&value.value);
+    if (name == nullptr || std::ranges::find(kSchedulerNames, *name) == kSchedulerNames.end()) {
+      return problem(value, fmt::format("scheduler: {} is no scheduler; allowed are {}", value.shown(),
+                                        join_names(kSchedulerNames)));
+    }
+    if (resource.scheduler.empty()) resource.scheduler = *name;
   }
 
   void read_resources(const TomlValue& value) {
     const TomlTable* const resources = table(value, "resource.NAME.task.NAME");
     if (resources == nullptr) return;
     for (const auto& [name, one] : *resources) {
-      const Resource* const resource = find_resource(name, one);
+      Resource* const resource = find_resource(name, one);
       const TomlTable* const members = table(one, "resource.NAME.task.NAME");
       if (resource == nullptr || members == nullptr) continue;
       for (const auto& [key, part] : *members) {
-        if (!read_part(key, part, resource))
-          refuse(key, part, "[resource.NAME.task.NAME] and [resource.NAME.program.NAME]");
+        if (key == "scheduler") {
+          read_scheduler(part, *resource);
+        } else if (!read_part(key, part, resource)) {
+          refuse(key, part, "scheduler, [resource.NAME.task.NAME] and [resource.NAME.program.NAME]");
+        }
       }
     }
   }
-  const Resource* find_resource(const std::string& name, const TomlValue& value) {
+  Resource* find_resource(const std::string& name, const TomlValue& value) {
     std::vector<std::string_view> names;
-    for (const Resource* const resource : resources_) {
+    for (Resource* const resource : resources_) {
       if (!resource->name.empty() && folded(resource->name) == folded(name)) return resource;
       if (!resource->name.empty()) names.push_back(resource->name);
     }
@@ -281,7 +294,7 @@ class TaskFileReader {
   }
 
   const Source& file_;
-  std::vector<const Resource*> resources_;
+  std::vector<Resource*> resources_;
   std::vector<KnownTask> tasks_;
   std::vector<KnownProgram> programs_;
   std::vector<ConfigProblem> problems_;

@@ -14,6 +14,11 @@ RTS_RESULT plc_set_task_options(const char* pszTask, const Task_Options* pOption
   return host == nullptr ? ERR_NOTINITIALIZED : host->set_task_options(pszTask, pOptions);
 }
 
+RTS_RESULT plc_prefer_scheduler(const char* pszScheduler) {
+  ApplicationHost* const host = ApplicationHost::current_for_control();
+  return host == nullptr ? ERR_NOTINITIALIZED : host->prefer_scheduler(pszScheduler);
+}
+
 RTS_RESULT plc_keep_variables(const char* pszName, void* pAddress, unsigned int dwBytes, RTS_UI64 qwLayout) {
   ApplicationHost* const host = ApplicationHost::current_for_control();
   if (host == nullptr) return ERR_NOTINITIALIZED;

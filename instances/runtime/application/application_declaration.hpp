@@ -35,6 +35,7 @@ struct ApplicationDeclaration {
   sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
   bool tasks_given_twice = false;
   std::vector<TaskSettings> task_options;
+  std::string scheduler;  ///< that it is made for; empty: it names none
   CarriedByName variables;
   std::uint64_t variable_bytes = 0;  ///< of all of them
   std::vector<RTS_HANDLE> events;    ///< own ones that it registers

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/tasks/task_builder.hpp"
+#include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
@@ -137,6 +138,20 @@ void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
   collected_->tasks = tasks;
   // Handles are there from this call on. Those of another version are those of the tasks that run.
   if (!has_application_) task_table_.set_up(tasks);
+}
+
+RTS_RESULT ApplicationHost::prefer_scheduler(const char* name) {
+  const auto refuse = [](RTS_RESULT why, std::string_view text) {
+    spdlog::error("plc_prefer_scheduler: {}", text);
+    return why;
+  };
+  if (collected_ == nullptr) return refuse(ERR_NOTINITIALIZED, "it is named in plc_app_init only");
+  if (name == nullptr) return refuse(ERR_PARAMETER, "pszScheduler is null");
+  const std::string wanted(cut(name, PLC_MAX_VARIABLE_NAME));
+  if (const auto found = find_scheduler(wanted); !found) return refuse(ERR_PARAMETER, found.error().message);
+  if (!collected_->scheduler.empty()) return refuse(ERR_DUPLICATE, "a scheduler is named twice");
+  collected_->scheduler = wanted;
+  return ERR_OK;
 }
 
 RTS_RESULT ApplicationHost::keep_variables(const std::string& name, const CarriedVariables& variables) {

@@ -111,6 +111,7 @@ class ApplicationHost {
 
   void set_up_tasks(sys_setup_tasks_struct* tasks) noexcept;
   [[nodiscard]] RTS_RESULT set_task_options(const char* task, const Task_Options* options);
+  [[nodiscard]] RTS_RESULT prefer_scheduler(const char* name);
   [[nodiscard]] RTS_RESULT keep_variables(const std::string& name, const CarriedVariables& variables);
   [[nodiscard]] RTS_HANDLE declare_area(const Plc_Area* area, RTS_RESULT& result);
   [[nodiscard]] RTS_RESULT declare_variable(const Plc_Variable* variable);

@@ -167,8 +167,12 @@ void Commit::hold(const std::function<bool(const void*)>& is_code) {
   std::exchange(host_, nullptr)->commit(std::move(declaration_), is_code);
 }
 
-std::string scheduler_for(const std::string& asked, const InstanceSettings& settings) {
-  return asked.empty() ? std::string(scheduler_of(settings.timer_mode)) : asked;
+std::string scheduler_for(const std::string& asked, const InstanceSettings& settings,
+                          const std::string& preferred) {
+  if (!asked.empty()) return asked;
+  if (settings.timer_mode == TimerMode::one_shot || preferred.empty())
+    return std::string(scheduler_of(settings.timer_mode));
+  return preferred;
 }
 
 }  // namespace plchost

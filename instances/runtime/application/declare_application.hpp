@@ -89,7 +89,9 @@ class Commit {
   std::string remark_;
 };
 
-/// The scheduler that `asked` and the settings lead to; `asked` may be empty.
-[[nodiscard]] std::string scheduler_for(const std::string& asked, const InstanceSettings& settings);
+/// The scheduler of a fresh process: `asked` by its start, else that of the settings, else `preferred` by the
+/// application. Both may be empty.
+[[nodiscard]] std::string scheduler_for(const std::string& asked, const InstanceSettings& settings,
+                                        const std::string& preferred = {});
 
 }  // namespace plchost

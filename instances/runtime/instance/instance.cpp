@@ -208,6 +208,7 @@ Result<std::string> Instance::load_application() {
   const LoadContext context = load_context();
   PLCHOST_TRY_ASSIGN(auto declared, declare_application(options_.launch.application, context));
   application_.emplace(std::move(declared.application));
+  scheduler_ = scheduler_for(options_.launch.scheduler, start_.settings, declared.declaration.scheduler);
   PLCHOST_TRY_ASSIGN(auto commit, Commit::prepare(context, *application_, std::move(declared.declaration)));
   commit.hold([](const void*) { return false; });
   return commit.remark();

@@ -87,7 +87,8 @@ std::optional<PoolRoom> room_in_pool(const LaunchOptions& launch, const std::opt
 
 // The tasks with their threads, which stay parked, under the scheduler that they are to have.
 Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
-                       const Application& application, ApplicationHost& host) {
+                       const DeclaredApplication& declared, ApplicationHost& host) {
+  const Application& application = declared.application;
   LinuxClock clock;
   TrialDevices devices;
   std::vector<TaskStatistics> statistics(application.tasks().size());
@@ -103,7 +104,8 @@ Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
   };
   PLCHOST_TRY_ASSIGN(const auto tasks,
                      TaskSet::create(clock, options.band, application.tasks(), std::move(environment)));
-  PLCHOST_TRY(tasks->prepare(scheduler_for(options.launch.scheduler, settings), settings.scheduler));
+  PLCHOST_TRY(tasks->prepare(
+      scheduler_for(options.launch.scheduler, settings, declared.declaration.scheduler), settings.scheduler));
   return {};
 }
 
@@ -141,7 +143,7 @@ Result<DeclaredApplication> try_start(const Options& options, Components& compon
   auto declared = declare_watched(options.check_application, context, components);
   if (!declared) return declared;
   PLCHOST_TRY(host.reserve(declared->declaration));
-  PLCHOST_TRY(try_tasks(options, start.settings, declared->application, host));
+  PLCHOST_TRY(try_tasks(options, start.settings, *declared, host));
   return declared;
 }
 

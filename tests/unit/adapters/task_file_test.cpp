@@ -141,15 +141,27 @@ TEST_F(TaskFile, RefusesKeysThatItDoesNotKnow) {
       problems("[task.fast]\n  watchdog = '5ms'"),
       ElementsAre(HasSubstr("a.toml:2:3: task fast unknown key 'watchdog'; allowed are external_event, "
                             "late_policy, start_offset, drives_outputs, watchdog_time, ")));
-  EXPECT_THAT(problems("[tasks.fast]\n[resource.press]\nx = 1"),
-              ElementsAre("a.toml:1:2: 'tasks' is not expected here; allowed are [task.NAME], "
-                          "[program.NAME], [resource.NAME.task.NAME] and [resource.NAME.program.NAME]",
-                          "a.toml:3:1: 'x' is not expected here; allowed are [resource.NAME.task.NAME] and "
-                          "[resource.NAME.program.NAME]"));
-  for (const char* const text :
-       {"scheduler = 'x'", "[task.fast]\nscheduler = 'x'", "[resource.press]\nscheduler = 'x'"}) {
-    EXPECT_THAT(problems(text), ElementsAre(HasSubstr("scheduler: the scheduler belongs to the instance")));
+  EXPECT_THAT(
+      problems("[tasks.fast]\n[resource.press]\nx = 1"),
+      ElementsAre(
+          "a.toml:1:2: 'tasks' is not expected here; allowed are scheduler, [task.NAME], "
+          "[program.NAME], [resource.NAME.task.NAME] and [resource.NAME.program.NAME]",
+          "a.toml:3:1: 'x' is not expected here; allowed are scheduler, [resource.NAME.task.NAME] and "
+          "[resource.NAME.program.NAME]"));
+  for (const char* const text : {"scheduler = 'x'", "[resource.press]\nscheduler = 7"}) {
+    EXPECT_THAT(problems(text), ElementsAre(HasSubstr("is no scheduler; allowed are CmpSchedule, Cmp")));
   }
+  EXPECT_THAT(problems("[task.fast]\nscheduler = 'CmpSchedule'"),
+              ElementsAre(HasSubstr("task fast scheduler: one scheduler runs all tasks")));
+}
+
+TEST_F(TaskFile, NamesTheSchedulerOfAllResourcesAndOfOne) {
+  EXPECT_THAT(problems("scheduler = 'CmpScheduleTimer'\n"), IsEmpty());
+  EXPECT_EQ(configuration.resources.front().scheduler, "CmpScheduleTimer");
+  EXPECT_THAT(
+      problems("scheduler = 'CmpScheduleTimer'\n[resource.press]\nscheduler = 'CmpScheduleOneShot'\n"),
+      IsEmpty());
+  EXPECT_EQ(configuration.resources.front().scheduler, "CmpScheduleOneShot");
 }
 
 struct Bad {

@@ -11,6 +11,7 @@ const any_function every_call[] = {
     (any_function)plc_instance_name,
     (any_function)plc_parameter,
     (any_function)plc_set_task_options,
+    (any_function)plc_prefer_scheduler,
     (any_function)plc_declare_area,
     (any_function)plc_area_address,
     (any_function)plc_get_area_state,
