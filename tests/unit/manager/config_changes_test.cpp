@@ -83,6 +83,7 @@ constexpr std::array kTwoValues = {
     TwoValues{"[host]", "read_variables", R"("viewer")", R"("operator")"},
     TwoValues{"[host]", "write_variables", R"("operator")", R"("engineer")"},
     TwoValues{"[host]", "log_level", R"("info")", R"("debug")"},
+    TwoValues{"[host]", "allow_debug", "true", "false"},
     TwoValues{"[host]", "keep_pool", "false", "true"},
     TwoValues{"[dds]", "enabled", "true", "false"},
     TwoValues{"[dds]", "interface", R"("lo")", R"("eth1")"},
