@@ -15,6 +15,7 @@
 #include "manager/store/wish_memory.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/debug_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/outputs_page.hpp"
@@ -134,6 +135,7 @@ void Manager::remove_pages(const std::string& instance) const {
   TransitionRing::remove(config_.host.pool, instance);
   LogRing::remove(config_.host.pool, instance);
   OutputsPage::remove(config_.host.pool, instance);
+  DebugPage::remove(config_.host.pool, instance);
 }
 
 }  // namespace plchost

@@ -48,7 +48,8 @@ class InstanceHost {
   /// Writes down the faults that the process shows in its page and cannot write down itself. In words the
   /// last one; empty: it shows none.
   [[nodiscard]] virtual std::string keep_lost_faults() = 0;
-  /// Puts outputs that a process which has ended could not put into their safe state there.
+  /// Puts outputs that a process which has ended could not put into their safe state there. No debugger is
+  /// shown its tasks any more.
   virtual void end_outputs() = 0;
   /// Takes the output of the process into the instance's log. To be called periodically.
   virtual void read_output() = 0;

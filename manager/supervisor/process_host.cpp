@@ -10,6 +10,7 @@
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/debug_page.hpp"
 #include "shm/pages/outputs_page.hpp"
 
 namespace plchost {
@@ -192,6 +193,7 @@ std::optional<InstanceRuntime> ProcessHost::runtime() {
 
 void ProcessHost::end_outputs() {
   plchost::end_outputs(settings_.pool, settings_.name);
+  DebugPage::remove(settings_.pool, settings_.name);  // nothing halts there any more
 }
 
 std::string ProcessHost::keep_lost_faults() {

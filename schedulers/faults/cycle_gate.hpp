@@ -42,7 +42,7 @@ class CycleGate {
     /// The code goes on, as if it had begun at `start`. Sleeps while the gate is closed. Null: there is none.
     void goes_on(CycleGate* gate, Clock& clock, TimePoint start) noexcept {
       if (gate != nullptr) enter(*gate, clock);
-      still_.store(false, std::memory_order_relaxed);
+      still_.store(false, std::memory_order_release);
       word_.store(start.time_since_epoch().count(), std::memory_order_release);
     }
 
@@ -59,7 +59,7 @@ class CycleGate {
     }
     /// The runtime does work of its own, or the code stands still. Any thread.
     [[nodiscard]] bool at_work() const noexcept {
-      return word_.load(std::memory_order_acquire) == kAtWork || still_.load(std::memory_order_relaxed);
+      return word_.load(std::memory_order_acquire) == kAtWork || still_.load(std::memory_order_acquire);
     }
 
    private:

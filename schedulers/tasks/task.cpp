@@ -96,7 +96,7 @@ void Task::run_cycle(const Activation& activation) noexcept {
   const TimePoint end = config_.after_entry ? clock_.now() : left;
   const Duration still = std::exchange(stood_still_, Duration::zero());
   state_->cycle_ended(activation.release, end);
-  if (still > Duration::zero()) pass_over(end);
+  if (still > Duration::zero()) pass_over(end, still);
   record(activation, start, end - still, std::exchange(ready_, end));
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());
   look_at_overrun(left - entered - still);
@@ -114,8 +114,9 @@ void Task::stand_still(const std::function<void()>& wait) noexcept {
   trap_.seat().goes_on(gate_, clock_, start + (to - from));
 }
 
-void Task::pass_over(TimePoint end) noexcept {
-  passed_.store(passed_.load(std::memory_order_relaxed) + state_->pass_over(end), std::memory_order_relaxed);
+void Task::pass_over(TimePoint end, Duration still) noexcept {
+  passed_.store(passed_.load(std::memory_order_relaxed) + state_->pass_over(end, still),
+                std::memory_order_relaxed);
 }
 
 void Task::work_between_cycles() noexcept {

@@ -132,7 +132,7 @@ class Task {
   void look_at_overrun(Duration execution) noexcept;
   void work_between_cycles() noexcept;
   void record(const Activation& activation, TimePoint start, TimePoint end, TimePoint ready) noexcept;
-  void pass_over(TimePoint end) noexcept;
+  void pass_over(TimePoint end, Duration still) noexcept;
 
   Clock& clock_;
   TaskConfig config_;

@@ -32,8 +32,8 @@ class TaskKindState {
   /// The cycle for `release` came to its end.
   virtual void cycle_ended(TimePoint /*release*/, TimePoint /*end*/) noexcept {}
 
-  /// The releases up to `until` pass without being lost; how many they are.
-  virtual std::uint64_t pass_over(TimePoint /*until*/) noexcept { return 0; }
+  /// The cycle that ended stood still for so long: the releases of that time are not lost; how many they are.
+  virtual std::uint64_t pass_over(TimePoint /*end*/, Duration /*still*/) noexcept { return 0; }
 
   /// The source of a task that runs when something happens; null: a scheduler says when it runs.
   /// `max_backlog` >= 1: the runs that the task may lag behind. Set-up.

@@ -58,7 +58,8 @@ class Connection {
       const TimePoint now = MonotonicClock::now();
       if (now < next_look) continue;
       next_look = now + kStateLook;
-      PLCHOST_TRY(session_.look());
+      // A state that changes all the time is looked at again.
+      if (auto seen = session_.look(); !seen && seen.error().code != ErrorCode::busy) return seen;
     }
     return {};
   }

@@ -221,6 +221,8 @@ Result<void> DapSession::look() {
   for (const Json& line : state_.value("log", Json::array())) {
     const auto number = line.value("number", std::uint64_t{0});
     if (number <= logged_) continue;
+    if (const std::string gap = log_gap(logged_, number); !gap.empty())
+      event("output", {{"category", "important"}, {"output", gap + "\n"}});
     logged_ = number;
     event("output", {{"category", "console"}, {"output", line.value("text", "") + "\n"}});
   }

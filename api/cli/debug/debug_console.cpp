@@ -90,11 +90,7 @@ Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& r
       {"print", &DebugConsole::print},
       {"set", &DebugConsole::set},
       {"wait", &DebugConsole::wait},
-      {"task",
-       [](auto& self, const auto& name) {
-         self.task_ = name;
-         return Result<void>();
-       }},
+      {"task", [](auto& self, const auto& name) { return self.choose(name); }},
       {"help", [](auto&, const auto&) {
          fmt::print("{}\n", fmt::join(kCommands, "\n"));
          return Result<void>();
@@ -144,6 +140,14 @@ Result<void> DebugConsole::tasks() {
     if (!stack.empty()) text += "  at " + place_text(stack.front());
     print_line(text);
   }
+  return {};
+}
+
+Result<void> DebugConsole::choose(const std::string& task) {
+  PLCHOST_TRY(look());
+  if (task_in(state_, task) == nullptr)
+    return failure(ErrorCode::not_found, fmt::format("no task '{}'", shown(task)));
+  task_ = task;
   return {};
 }
 
@@ -233,7 +237,7 @@ Result<void> DebugConsole::wait(const std::string& seconds) {
   double given = kWaitSeconds;
   if (!seconds.empty()) {
     const auto [end, error] = std::from_chars(seconds.data(), seconds.data() + seconds.size(), given);
-    if (error != std::errc{} || end != seconds.data() + seconds.size() || given < 0 || given > 86400) {
+    if (error != std::errc{} || end != seconds.data() + seconds.size() || !(given >= 0 && given <= 86400)) {
       return failure(ErrorCode::invalid_argument,
                      fmt::format("'{}' is no number of seconds from 0 to 86400", shown(seconds)));
     }
@@ -254,8 +258,9 @@ Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patie
     });
     if (halted) return {};
     if (MonotonicClock::now() >= end || interrupted()) {
-      return failure(ErrorCode::timed_out, fmt::format("{} has not halted within {:.1f} s",
-                                                       task.empty() ? "no task" : "task '" + task + "'",
+      return failure(ErrorCode::timed_out, fmt::format("{} within {:.1f} s",
+                                                       task.empty() ? "no further task has halted"
+                                                                    : "task '" + task + "' has not halted",
                                                        std::chrono::duration<double>(patience).count()));
     }
     std::this_thread::sleep_for(kLook);
@@ -267,6 +272,7 @@ void DebugConsole::take(const Json& state) {
   for (const Json& line : state.value("log", Json::array())) {
     const auto number = line.value("number", std::uint64_t{0});
     if (number <= logged_) continue;
+    if (const std::string gap = log_gap(logged_, number); !gap.empty()) print_line(gap);
     logged_ = number;
     print_line("log: " + line.value("text", ""));
   }

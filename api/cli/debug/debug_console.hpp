@@ -38,6 +38,7 @@ class DebugConsole {
   [[nodiscard]] Result<void> go_on(std::string_view verb, const std::string& rest);
   [[nodiscard]] Result<void> wait(const std::string& seconds);
   [[nodiscard]] Result<void> wait_for_halt(const std::string& task, Duration patience);
+  [[nodiscard]] Result<void> choose(const std::string& task);
   [[nodiscard]] Result<std::string> task_or_current(const std::string& named);
   [[nodiscard]] std::string frame_instance() const;
   void take(const nlohmann::json& state);

@@ -43,7 +43,8 @@ Result<void> read_commands(DebugConsole& console) {
     const int found = ::poll(&ready, 1, kIdleMs);
     if (interrupted()) return {};
     if (found <= 0) {
-      PLCHOST_TRY(console.look());
+      // A state that changes all the time is looked at again.
+      if (auto seen = console.look(); !seen && seen.error().code != ErrorCode::busy) return seen;
       continue;
     }
     std::array<char, 4096> bytes{};

@@ -16,27 +16,52 @@ namespace plchost {
 
 namespace {
 
-// Beyond that the variables of a POU lie elsewhere than its instance: they are shared.
+// Beyond that a variable of a POU lies elsewhere than its instance.
 constexpr std::ptrdiff_t kMaxInstanceBytes = 16 << 20;
+
+// A variable of all instances, which are at `selves`: it lies at `addresses`. Nothing: not in the same place
+// of each, nor in one for all.
+std::optional<ValuePlace> place_in_each(ValuePlace place, std::span<const std::byte* const> selves,
+                                        std::span<const std::byte* const> addresses) {
+  place.address = addresses.front();
+  const auto is_first = [&](const auto* one) { return one == addresses.front(); };
+  if (addresses.size() > 1 && std::ranges::all_of(addresses, is_first)) return place;
+  place.offset = addresses.front() - selves.front();
+  place.of_self = place.offset >= 0 && place.offset < kMaxInstanceBytes;
+  for (std::size_t i = 1; i < addresses.size(); ++i) {
+    if (!place.of_self || addresses[i] - selves[i] != place.offset) return std::nullopt;
+  }
+  return place;
+}
 
 }  // namespace
 
-Result<ValuePlace> DebugService::find_value(std::uint32_t pou, std::string_view name) const {
+ValuePlace DebugService::place_of(VariableElement element) const {
   const VariableAccess& variables = program_.variables();
-  const auto place_of = [&](VariableElement element) {
-    const VariableSymbol& symbol = variables.symbol(element);
-    return ValuePlace{.type = symbol.type, .bytes = symbol.bytes, .address = variables.bytes(element).data()};
-  };
-  if (const auto instance = program_.pous().any_instance(pou)) {
-    if (const auto own = variables.find(fmt::format("{}.{}", instance->path, name))) {
-      ValuePlace place = place_of(*own);
-      place.offset = place.address - static_cast<const std::byte*>(instance->self);
-      place.of_self = place.offset >= 0 && place.offset < kMaxInstanceBytes;
-      return place;
-    }
+  const VariableSymbol& symbol = variables.symbol(element);
+  return {.type = symbol.type, .bytes = symbol.bytes, .address = variables.bytes(element).data()};
+}
+
+Result<std::optional<ValuePlace>> DebugService::find_own_value(std::uint32_t pou,
+                                                               std::string_view name) const {
+  std::optional<ValuePlace> own;
+  std::vector<const std::byte*> selves;
+  std::vector<const std::byte*> addresses;
+  const auto instances = program_.pous().instances_of(pou);
+  for (const auto& instance : instances) {
+    const auto found = program_.variables().find(fmt::format("{}.{}", instance.path, name));
+    if (!found) continue;
+    own = place_of(*found);
+    selves.push_back(static_cast<const std::byte*>(instance.self));
+    addresses.push_back(own->address);
   }
-  PLCHOST_TRY_ASSIGN(const auto element, variables.find(name));
-  return place_of(element);
+  if (!own) return std::nullopt;
+  if (addresses.size() == instances.size()) own = place_in_each(*own, selves, addresses);
+  if (own && addresses.size() == instances.size()) return own;
+  return failure(
+      ErrorCode::unsupported,
+      fmt::format("'{}' of {} lies apart from its instances: name that of one of them, as '{}.{}'",
+                  shown(name), program_.pous().pous()[pou].name, instances.front().path, shown(name)));
 }
 
 Result<Breakpoint> DebugService::resolve(std::uint32_t id, BreakpointOrder order) const {
@@ -46,9 +71,16 @@ Result<Breakpoint> DebugService::resolve(std::uint32_t id, BreakpointOrder order
                         .hit_rule = {},
                         .condition = {},
                         .log = {},
+                        .elsewhere = {},
                         .hits = std::make_shared<std::atomic<std::uint64_t>>(0)};
   PLCHOST_TRY_ASSIGN(breakpoint.place, program_.pous().find(breakpoint.order.place));
-  const FindValue find = [&](std::string_view name) { return find_value(breakpoint.place.pou, name); };
+  const FindValue find = [&](std::string_view name) -> Result<ValuePlace> {
+    PLCHOST_TRY_ASSIGN(const auto own, find_own_value(breakpoint.place.pou, name));
+    if (own) return *own;
+    PLCHOST_TRY_ASSIGN(const auto element, program_.variables().find(name));
+    if (name.find('.') == std::string_view::npos) breakpoint.elsewhere.emplace_back(name);
+    return place_of(element);
+  };
   if (!breakpoint.order.hits.empty()) {
     PLCHOST_TRY_ASSIGN(breakpoint.hit_rule, HitRule::parse(breakpoint.order.hits));
   }
@@ -74,11 +106,20 @@ Result<std::string> DebugService::add_breakpoint(std::string_view text) {
                               {"pou", pou.name},
                               {"file", pou.file},
                               {"line", breakpoint.place.line},
-                              {"remark", remark()}});
+                              {"remark", remark_of(breakpoint)}});
   Breakpoints more = breakpoints_;
   more.push_back(std::make_shared<const Breakpoint>(std::move(breakpoint)));
   publish(std::move(more));
   return answer;
+}
+
+std::string DebugService::remark_of(const Breakpoint& breakpoint) const {
+  std::string text = remark();
+  if (breakpoint.elsewhere.empty()) return text;
+  if (!text.empty()) text += "; ";
+  return text + fmt::format("no variables of {}, but of the application: {}",
+                            program_.pous().pous()[breakpoint.place.pou].name,
+                            join_some(breakpoint.elsewhere));
 }
 
 Result<std::string> DebugService::remove_breakpoints(std::string_view id) {

@@ -26,6 +26,9 @@ Result<void> DebugService::attach(Program program) {
   for (std::size_t i = 0; i < program_.tasks->size(); ++i)
     tasks_.push_back(std::make_unique<DebugTask>(program_.tasks->task(i), board_));
   told_halts_.resize(tasks_.size());
+  // No debugger of a process before has a number of this one.
+  last_session_ =
+      static_cast<std::uint64_t>(MonotonicClock::now().time_since_epoch() / std::chrono::milliseconds(1));
   return {};
 }
 
@@ -69,7 +72,8 @@ Result<std::string> DebugService::begin_session(bool take, TimePoint now) {
   if (session_ != 0) end_session("another debugger takes over");
   session_ = ++last_session_;
   seen_ = now;
-  halt_all_ = false;
+  log_.clear();
+  for (const auto& task : tasks_) (void)task->forget_steps();
   arm();
   spdlog::warn("a debugger attaches: session {}", session_);
   return debug_answer(
@@ -201,9 +205,8 @@ void DebugService::end_session(std::string_view why) {
                breakpoints_.size(), count);
   publish({});
   session_ = 0;
-  for (const auto& task : tasks_) {
-    (void)task->forget_steps();
-  }
+  halt_all_ = false;
+  for (const auto& task : tasks_) (void)task->forget_steps();
   let_all_go();
   arm();
 }
@@ -262,7 +265,7 @@ void DebugService::advance(TimePoint now) {
   }
   // A task that was about to halt when the session ended.
   if (session_ == 0) let_all_go();
-  if (fresh && halt_all_) {
+  if (fresh && halt_all_ && session_ != 0) {
     for (const auto& task : tasks_) {
       if (!task->halt() && !task->ignored()) task->pause();
     }

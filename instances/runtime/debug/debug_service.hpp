@@ -100,8 +100,12 @@ class DebugService {
                                          const DebugTask::Halt& halt) const;
   [[nodiscard]] Result<std::vector<std::size_t>> tasks_named(std::string_view name) const;
   [[nodiscard]] Result<Breakpoint> resolve(std::uint32_t id, BreakpointOrder order) const;
-  [[nodiscard]] Result<ValuePlace> find_value(std::uint32_t pou, std::string_view name) const;
+  /// Nothing: the POU has no variable of that name.
+  [[nodiscard]] Result<std::optional<ValuePlace>> find_own_value(std::uint32_t pou,
+                                                                 std::string_view name) const;
+  [[nodiscard]] ValuePlace place_of(VariableElement element) const;
   [[nodiscard]] std::string remark() const;
+  [[nodiscard]] std::string remark_of(const Breakpoint& breakpoint) const;
   void end_session(std::string_view why);
   /// Task and rule of each.
   void let_go(std::span<const std::pair<std::size_t, StepRule>> tasks);

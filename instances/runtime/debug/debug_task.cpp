@@ -68,7 +68,7 @@ void DebugTask::stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReaso
   const TimePoint from = MonotonicClock::now();
   task_.stand_still([this, gate] {
     if (board_.suspended.load(std::memory_order_acquire)) return;
-    halted_.store(1, std::memory_order_release);
+    halted_.store(std::uint64_t{gate} + 1, std::memory_order_release);
     const std::uint64_t one = 1;
     (void)!::write(board_.notify, &one, sizeof one);  // fails only if it is readable already
     const auto is_held = [&] {
@@ -82,14 +82,16 @@ void DebugTask::stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReaso
 }
 
 std::optional<DebugTask::Halt> DebugTask::halt() const noexcept {
-  // While they are suspended a task may be about to leave its halt.
-  if (halted_.load(std::memory_order_acquire) == 0 || board_.suspended.load(std::memory_order_relaxed))
+  // One that was roused may not have left its halt yet: only the control thread turns the gate.
+  const std::uint64_t gate = gate_.load(std::memory_order_relaxed);
+  if (halted_.load(std::memory_order_acquire) != gate + 1 || board_.suspended.load(std::memory_order_relaxed))
     return std::nullopt;
   return halt_;
 }
 
 void DebugTask::let_go(const StepRule& step) noexcept {
   step_ = step;
+  pause_.store(false, std::memory_order_relaxed);
   stepping_.store(step.kind != StepRule::Kind::none, std::memory_order_relaxed);
   halted_.store(0, std::memory_order_relaxed);
 }

@@ -90,7 +90,7 @@ class DebugTask {
   std::atomic<bool> stepping_{false};
   StepRule step_;                         // written by the control thread while the task halts
   std::atomic<std::uint32_t> gate_{0};    // the thread sleeps on it: it changes when the task may go on
-  std::atomic<std::uint32_t> halted_{0};  // 1: halt_ holds
+  std::atomic<std::uint64_t> halted_{0};  // the gate on which it sleeps, and 1; 0: it does not halt
   Halt halt_;
   std::atomic<std::uint64_t> halts_{0};
   std::atomic<std::int64_t> halted_ns_{0};

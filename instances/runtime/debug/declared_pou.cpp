@@ -99,10 +99,12 @@ std::string_view PouCollection::path_of(std::uint32_t pou, const void* self) con
   return found == instances_.end() ? std::string_view() : std::string_view(found->second);
 }
 
-std::optional<PouCollection::PouInstance> PouCollection::any_instance(std::uint32_t pou) const {
-  const auto found = instances_.lower_bound({pou, nullptr});
-  if (found == instances_.end() || found->first.first != pou) return std::nullopt;
-  return PouInstance{.self = found->first.second, .path = found->second};
+std::vector<PouCollection::PouInstance> PouCollection::instances_of(std::uint32_t pou) const {
+  std::vector<PouInstance> found;
+  for (auto one = instances_.lower_bound({pou, nullptr}); one != instances_.end() && one->first.first == pou;
+       ++one)
+    found.push_back({.self = one->first.second, .path = one->second});
+  return found;
 }
 
 Result<PouLine> PouCollection::find(std::string_view place) const {

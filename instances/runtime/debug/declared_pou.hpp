@@ -43,12 +43,12 @@ class PouCollection {
   [[nodiscard]] std::span<const DeclaredPou> pous() const noexcept { return pous_; }
   /// Where the variables of an instance are called so; empty: it was not declared.
   [[nodiscard]] std::string_view path_of(std::uint32_t pou, const void* self) const noexcept;
-  /// Any instance of that POU.
   struct PouInstance {
     const void* self = nullptr;
     std::string path;
   };
-  [[nodiscard]] std::optional<PouInstance> any_instance(std::uint32_t pou) const;
+  /// All that are declared of that POU.
+  [[nodiscard]] std::vector<PouInstance> instances_of(std::uint32_t pou) const;
 
   /// The statement at or behind a place: "POU:LINE", "FILE:LINE", or "POU", its first one. The file may be
   /// given by its last name alone. not_found: there is no such POU or file, or no statement from that line

@@ -229,6 +229,7 @@ Result<std::string> Instance::make_status_page() {
 }
 
 Result<std::string> Instance::make_tasks() {
+  DebugPage::remove(options_.launch.pool, options_.launch.name);  // of a process before
   if (!application_) return {};
   TaskEnvironment environment{
       .find_event = [this](std::string_view event) { return host_->events().bind_task(event); },

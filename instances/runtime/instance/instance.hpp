@@ -131,6 +131,7 @@ class Instance {
   /// If the application is a debug build.
   [[nodiscard]] Result<void> attach_debugger();
   [[nodiscard]] Result<std::string> debug(const std::string& command);
+  void hear_debugger();
   void advance_debugger();
   void show_debug_state();
   [[nodiscard]] bool has_debugger() const noexcept;
@@ -143,6 +144,7 @@ class Instance {
   void resume_debugging();
   /// "2 halted tasks were let go first", or nothing. Once.
   [[nodiscard]] std::string take_let_go();
+  [[nodiscard]] std::string with_let_go(const std::string& text);
 
   // Variables that are seen from outside: instance_variables.cpp
   /// A change of variables that waits for a moment between all cycles.

@@ -83,7 +83,8 @@ void Instance::drop_change(const std::string& why) {
   const std::string path = change_->path();
   change_.reset();
   resume_debugging();
-  answer_waiting(ErrorCode::refused, fmt::format("{} has not taken over: {}; nothing is changed", path, why));
+  answer_waiting(ErrorCode::refused,
+                 with_let_go(fmt::format("{} has not taken over: {}; nothing is changed", path, why)));
 }
 
 }  // namespace plchost

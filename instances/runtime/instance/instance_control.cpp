@@ -115,7 +115,11 @@ Result<std::string> Instance::set_scheduler(const std::string& name) {
     const auto switched = tasks_->switch_to(name, start_.settings.scheduler);
     if (switched) scheduler_ = name;
     resume_debugging();
-    if (!switched) return std::unexpected(switched.error());
+    if (!switched) {
+      Error error = switched.error();
+      error.message = with_let_go(error.message);
+      return std::unexpected(std::move(error));
+    }
   }
   scheduler_ = name;
   return take_let_go();

@@ -18,10 +18,7 @@ constexpr auto kShowPause = std::chrono::milliseconds(10);
 }  // namespace
 
 Result<void> Instance::attach_debugger() {
-  if (host_->declaration().pous.pous().empty()) {
-    DebugPage::remove(options_.launch.pool, options_.launch.name);  // of a process before
-    return {};
-  }
+  if (host_->declaration().pous.pous().empty()) return {};
   if (options_.launch.no_debug)
     return failure(ErrorCode::refused,
                    "the application is a debug build, and this host says allow_debug = false");
@@ -42,17 +39,24 @@ bool Instance::has_debugger() const noexcept {
 }
 
 Result<std::string> Instance::debug(const std::string& command) {
+  hear_debugger();
   auto done = host_->debug().obey(command, MonotonicClock::now());
   spdlog::info("debug {}: {}", command, done ? *done : done.error().describe());
   show_debug_state();
   return done;
 }
 
+// A stranger may have written a time that is still to come: it would count for ever.
+void Instance::hear_debugger() {
+  if (!debug_page_) return;
+  const auto asked = debug_page_->asked();
+  if (asked.when <= MonotonicClock::now()) host_->debug().seen(asked.session, asked.when);
+}
+
 void Instance::advance_debugger() {
   if (!has_debugger() || !debug_page_) return;
+  hear_debugger();
   const TimePoint now = MonotonicClock::now();
-  const auto asked = debug_page_->asked();
-  host_->debug().seen(asked.session, std::min(asked.when, now));
   host_->debug().advance(now);
   show_halts();
   if (now < debug_shown_ + kShowPause || debug_page_->is_being_read(now)) return;
@@ -89,6 +93,11 @@ void Instance::resume_debugging() {
 std::string Instance::take_let_go() {
   const std::size_t count = std::exchange(let_go_, 0);
   return count == 0 ? std::string() : fmt::format("{} halted tasks were let go first", count);
+}
+
+std::string Instance::with_let_go(const std::string& text) {
+  const std::string told = take_let_go();
+  return told.empty() ? text : fmt::format("{}; {}", text, told);
 }
 
 }  // namespace plchost

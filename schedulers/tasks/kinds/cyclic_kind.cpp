@@ -41,8 +41,8 @@ class CyclicKind final : public TaskKindState {
     grid_.shift(follower_->correction(grid_.next(), grid_.interval(), config_.start_offset, end));
   }
 
-  std::uint64_t pass_over(TimePoint until) noexcept override {
-    const std::uint64_t passed = grid_.pass_over(until);
+  std::uint64_t pass_over(TimePoint end, Duration still) noexcept override {
+    const std::uint64_t passed = grid_.pass_over(std::min(end, grid_.next() + still));
     set_due(grid_.next());
     return passed;
   }

@@ -1,6 +1,8 @@
 // The application of a real plc-instance is debugged: by the commands that its debugger sends.
 #include <chrono>
 #include <csignal>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <thread>
 
@@ -80,6 +82,15 @@ TEST_F(DebuggingByHand, KeepsConditionsAndCounts) {
   EXPECT_THAT(refused("dance"), HasSubstr("until TASK PLACE"));
 }
 
+TEST_F(DebuggingByHand, SaysWhichVariablesAConditionMeans) {
+  attach();
+  EXPECT_EQ(command("break Counter:14 if n < 0").value("remark", "x"), "");
+  EXPECT_THAT(command("break Counter:14 if bias > 3").value("remark", ""),
+              HasSubstr("no variables of Counter, but of the application: bias"));
+  EXPECT_THAT(refused("break Lamp if lit > 0"), HasSubstr("name that of one of them, as 'left.lit'"));
+  EXPECT_EQ(command("break Lamp if right.lit > 0").value("remark", "x"), "");
+}
+
 TEST_F(DebuggingByHand, WritesLogPointsAndHaltsNot) {
   attach();
   command("break Counter:14 hits %5 log n is {n} of {Main.cycles}");
@@ -146,6 +157,42 @@ TEST_F(DebuggingByHand, LetsTasksGoWhenTheDebuggerIsSilent) {
   EXPECT_TRUE(eventually([&] { return state().value("session", 1) == 0; }));
   EXPECT_TRUE(goes_on("Main"));
   EXPECT_THAT(process_->log(), HasSubstr("its debugger was silent for 10 s"));
+}
+
+TEST_F(DebuggingByHand, LetsTasksGoAlsoIfAStrangerHasWrittenATimeThatIsStillToCome) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  auto memory = MemoryFile::open(debug_page_name(sandbox_.pool(), "line1"), sizeof(DebugPageLayout),
+                                 MemoryFile::Access::read_write);
+  ASSERT_TRUE(memory);
+  auto& page = *reinterpret_cast<DebugPageLayout*>(memory->bytes().data());
+  page.asking_session.store(session_);
+  page.asked_ns.store(std::numeric_limits<std::int64_t>::max());
+  session_ = 0;
+  EXPECT_TRUE(eventually([&] { return state().value("session", 1) == 0; }));
+  EXPECT_TRUE(goes_on("Main"));
+}
+
+// A debugger that has not looked for a while takes no session of another one.
+TEST_F(DebuggingByHand, HasSessionsOfWhichNoneIsThatOfAnotherProcess) {
+  attach();
+  const std::uint64_t before = session_;
+  process_.reset();
+  start(application("steps"));
+  attach();
+  EXPECT_NE(session_, before);
+  session_ = before;
+  EXPECT_THAT(refused("continue *"), HasSubstr("is over"));
+}
+
+TEST_F(DebuggingByHand, ShowsANewDebuggerNoLinesOfTheOneBefore) {
+  attach();
+  command("break Counter:14 log n is {n}");
+  EXPECT_TRUE(eventually([&] { return !state()["log"].empty(); }));
+  command("detach");
+  attach();
+  EXPECT_TRUE(state()["log"].empty());
 }
 
 TEST_F(DebuggingByHand, StopsAndStartsAHaltedTask) {

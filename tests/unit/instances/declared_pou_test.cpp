@@ -85,9 +85,9 @@ TEST_F(DeclaredPous, HaveInstances) {
   EXPECT_EQ(sut.declare_instance(nullptr, &data[2], "x"), ERR_PARAMETER);
   EXPECT_EQ(sut.path_of(1, &data[1]), "Main.right");
   EXPECT_EQ(sut.path_of(0, &data[1]), "");
-  EXPECT_FALSE(sut.any_instance(0));
-  ASSERT_TRUE(sut.any_instance(1));
-  EXPECT_EQ(sut.any_instance(1)->path, "Main.left");
+  EXPECT_TRUE(sut.instances_of(0).empty());
+  ASSERT_FALSE(sut.instances_of(1).empty());
+  EXPECT_EQ(sut.instances_of(1).front().path, "Main.left");
 }
 
 }  // namespace

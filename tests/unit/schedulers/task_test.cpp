@@ -337,5 +337,23 @@ TEST_F(TaskTest, StandsStillInTheMiddleOfACycle) {
   EXPECT_EQ(next.release - TimePoint(Duration(counters().release_ns)), milliseconds(80));
 }
 
+// Its own time costs releases as in any other cycle.
+TEST_F(TaskTest, LosesTheReleasesOfItsOwnTimeAlsoInACycleThatStoodStill) {
+  CycleGate gate;
+  TaskConfig config = cyclic();
+  Task* task = nullptr;
+  config.entry = [&] {
+    task->stand_still([&] { clock.run_for(milliseconds(20)); });
+    clock.run_for(milliseconds(45));
+  };
+  Task sut(clock, config, statistics, nullptr);
+  task = &sut;
+  sut.pass(gate);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(sut.releases_passed(), 2U);
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).lost_cycles, 4U) << "six lie within its 65 ms";
+}
+
 }  // namespace
 }  // namespace plchost

@@ -25,6 +25,13 @@ static struct {
   int runs;
 } edge_program;
 
+/* Two of a program that never runs. Its variable lies apart, as one at a location does. */
+static struct {
+  int unused;
+} lamps[2];
+static int lit[2];
+static int bias;
+
 static void* main_output;
 static void* edge_output;
 
@@ -33,11 +40,13 @@ static const unsigned int counter_lines[] = {12, 14};
 static const unsigned int main_lines[] = {22, 23, 24, 26};
 static const unsigned int other_lines[] = {32, 33};
 static const unsigned int edge_lines[] = {42};
+static const unsigned int lamp_lines[] = {52};
 static Plc_Pou twice = {sizeof(Plc_Pou), "Twice", "src/steps.st", twice_lines, 1, 0};
 static Plc_Pou counter = {sizeof(Plc_Pou), "Counter", "src/steps.st", counter_lines, 2, 0};
 static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "src/steps.st", main_lines, 4, 0};
 static Plc_Pou other = {sizeof(Plc_Pou), "Other", "src/steps.st", other_lines, 2, 0};
 static Plc_Pou edge = {sizeof(Plc_Pou), "Edge", "src/steps.st", edge_lines, 1, 0};
+static Plc_Pou lamp = {sizeof(Plc_Pou), "Lamp", "src/steps.st", lamp_lines, 1, 0};
 
 static int run_twice(int value) {
   PLC_ENTER(twice, 0);
@@ -85,7 +94,9 @@ static void CDECL run_edge(void) {
 static int declare_pous(void) {
   return plc_debug_declare_pou(&twice) == ERR_OK && plc_debug_declare_pou(&counter) == ERR_OK &&
          plc_debug_declare_pou(&main_pou) == ERR_OK && plc_debug_declare_pou(&other) == ERR_OK &&
-         plc_debug_declare_pou(&edge) == ERR_OK &&
+         plc_debug_declare_pou(&edge) == ERR_OK && plc_debug_declare_pou(&lamp) == ERR_OK &&
+         plc_debug_declare_instance(&lamp, &lamps[0], "left") == ERR_OK &&
+         plc_debug_declare_instance(&lamp, &lamps[1], "right") == ERR_OK &&
          plc_debug_declare_instance(&main_pou, &main_program, "Main") == ERR_OK &&
          plc_debug_declare_instance(&counter, &main_program.counter, "Main.counter") == ERR_OK &&
          plc_debug_declare_instance(&other, &other_program, "Other") == ERR_OK;
@@ -127,6 +138,9 @@ int CDECL plc_app_init(void) {
   PLC_DECLARE_VARIABLE("Main.counter.step", PLC_TYPE_INT, main_program.counter.step);
   PLC_DECLARE_VARIABLE("Main.counter.n", PLC_TYPE_DINT, main_program.counter.n);
   PLC_DECLARE_VARIABLE("Other.cycles", PLC_TYPE_DINT, other_program.cycles);
+  PLC_DECLARE_VARIABLE("left.lit", PLC_TYPE_DINT, lit[1]);
+  PLC_DECLARE_VARIABLE("right.lit", PLC_TYPE_DINT, lit[0]);
+  PLC_DECLARE_VARIABLE("bias", PLC_TYPE_DINT, bias);
   PLC_DECLARE_VARIABLE("Edge.runs", PLC_TYPE_DINT, edge_program.runs);
   __sys__setup__tasks(&setup);
   return SchedRegisterExternalEvent("edge", NULL) != RTS_INVALID_HANDLE ? 0 : 2;
