@@ -1,0 +1,80 @@
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "api/cli/debug/dap_messages.hpp"
+#include "instances/runtime/debug/breakpoint.hpp"
+#include "instances/runtime/debug/condition.hpp"
+#include "instances/runtime/debug/declared_pou.hpp"
+#include "shm/pages/debug_page.hpp"
+
+namespace {
+
+using namespace plchost;
+
+// One variable of each type, called by the number of its type.
+Result<ValuePlace> find_value(std::string_view name) {
+  static const std::array<std::byte, 512> bytes{};
+  const auto types = variable_types();
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    if (name != "v" + std::to_string(i)) continue;
+    const std::uint32_t size = types[i].bytes != 0 ? types[i].bytes : 16U;
+    return ValuePlace{.type = types[i].type, .bytes = size, .of_self = i % 2 == 0, .address = bytes.data()};
+  }
+  return failure(ErrorCode::not_found, "no such variable");
+}
+
+void read_messages(std::string_view text) {
+  DapReader reader;
+  for (std::size_t at = 0; at < text.size(); at += 7) {
+    reader.add(text.substr(at, 7));
+    for (;;) {
+      const auto message = reader.next();
+      if (!message) return;
+      if (!*message) break;
+      if (dap_packet(**message).empty()) std::abort();
+    }
+  }
+}
+
+// What is accepted can be evaluated, in a frame with variables and in one without.
+void make_breakpoint(std::string_view text) {
+  const auto order = BreakpointOrder::parse(text);
+  if (!order || order->place.empty()) return;
+  (void)HitRule::parse(order->hits);
+  (void)LogTemplate::parse(order->log, find_value);
+  const auto condition = Condition::parse(order->condition, find_value);
+  if (!condition) return;
+  const std::array<std::byte, 512> self{};
+  (void)condition->holds(self.data());
+  (void)condition->holds(nullptr);
+}
+
+void find_place(std::string_view text) {
+  static constexpr std::array kLines = {3U, 7U, 4'000'000'000U};
+  static Plc_Pou pou = {sizeof(Plc_Pou), "Main", "src/main.st", kLines.data(), kLines.size(), 0};
+  static const PouCollection pous = [] {
+    PouCollection made;
+    if (made.declare(&pou) != ERR_OK) std::abort();
+    return made;
+  }();
+  const auto found = pous.find(text);
+  if (found && (found->pou != 0 || !pous.pous().front().line_from(found->line))) std::abort();
+}
+
+}  // namespace
+
+// Messages of a client of the Debug Adapter Protocol, commands of a debugger, places, and questions for its
+// state.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  read_messages(text);
+  make_breakpoint(text);
+  (void)Condition::parse(text, find_value);
+  find_place(text);
+  (void)DebugPart::parse(text);
+  return 0;
+}
