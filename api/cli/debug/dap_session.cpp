@@ -75,7 +75,7 @@ DapSession::Answer DapSession::carry_out(const std::string& command, const Json&
                 {"supportTerminateDebuggee", false}};
   }
   if (command == "attach" || command == "launch") {
-    if (command == "attach") return attach();
+    if (command == "attach") return attach(arguments);
     return failure(ErrorCode::unsupported, "an instance is attached to: use the request 'attach'");
   }
   if (command == "disconnect" || command == "terminate") {
@@ -103,8 +103,12 @@ DapSession::Answer DapSession::carry_out(const std::string& command, const Json&
                  fmt::format("'{}' is no request that is served here", shown(command)));
 }
 
-DapSession::Answer DapSession::attach() {
+DapSession::Answer DapSession::attach(const Json& arguments) {
   PLCHOST_TRY_ASSIGN(const auto remark, link_.attach(take_));
+  const auto all = arguments.find("haltAllTasks");
+  if (all != arguments.end() && *all == true) {
+    PLCHOST_TRY(link_.command("halts all"));
+  }
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   tasks_.clear();
   for (const Json& task : state_.value("tasks", Json::array())) tasks_.push_back(task.value("task", ""));

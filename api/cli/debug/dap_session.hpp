@@ -38,7 +38,7 @@ class DapSession {
   static constexpr std::int64_t kFramesOfThread = 1000;
 
   [[nodiscard]] Answer carry_out(const std::string& command, const Json& arguments);
-  [[nodiscard]] Answer attach();
+  [[nodiscard]] Answer attach(const Json& arguments);
   [[nodiscard]] Answer set_breakpoints(const Json& arguments);
   [[nodiscard]] Answer set_function_breakpoints(const Json& arguments);
   [[nodiscard]] Json set_one(const std::string& key, const std::string& place, const Json& wanted);

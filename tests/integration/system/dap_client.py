@@ -54,11 +54,11 @@ class Client:
             self.events.append(message)
 
 
-def attached(port):
+def attached(port, **arguments):
     client = Client(port)
     assert client.ask("initialize", adapterID="test")["supportsConditionalBreakpoints"]
     client.ask("stackTrace", expect=False, threadId=1)
-    client.ask("attach")
+    client.ask("attach", **arguments)
     client.event("initialized")
     return client
 
@@ -129,6 +129,14 @@ def garbage(port):
             pass
 
 
+def all_halt(port):
+    client = attached(port, haltAllTasks=True)
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Twice"}])
+    halts = [client.event("stopped"), client.event("stopped")]
+    assert sorted(one["reason"] for one in halts) == ["breakpoint", "pause"], halts
+    client.ask("disconnect")
+
+
 def vanish(port):
     client = attached(port)
     client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Main"}])
@@ -136,4 +144,4 @@ def vanish(port):
     client.socket.close()
 
 
-{"story": story, "garbage": garbage, "vanish": vanish}[sys.argv[2]](int(sys.argv[1]))
+{"story": story, "garbage": garbage, "all_halt": all_halt, "vanish": vanish}[sys.argv[2]](int(sys.argv[1]))

@@ -43,6 +43,10 @@ echo "- garbage on the port ends that connection, and nothing else"
 python3 "$(dirname "$0")/dap_client.py" "$port" garbage || fail "garbage"
 python3 "$(dirname "$0")/dap_client.py" "$port" story || fail "the story after garbage"
 
+echo "- a client whose breakpoint halts all tasks"
+python3 "$(dirname "$0")/dap_client.py" "$port" all_halt || fail "all_halt"
+until_true 10 runs_on
+
 echo "- a client that vanishes: its breakpoints go, and the task goes on"
 python3 "$(dirname "$0")/dap_client.py" "$port" vanish || fail "vanish"
 until_true 10 runs_on
