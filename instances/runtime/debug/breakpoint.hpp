@@ -67,7 +67,7 @@ struct Breakpoint {
   HitRule hit_rule;
   std::optional<Condition> condition;
   std::optional<LogTemplate> log;
-  std::vector<std::string> elsewhere;                ///< names in it that are no variables of its POU
+  std::vector<std::string> elsewhere = {};           ///< names in it that are no variables of its POU
   std::shared_ptr<std::atomic<std::uint64_t>> hits;  ///< those whose condition held
 };
 
