@@ -11,6 +11,7 @@ static short raw, twice;
 static unsigned char byte;
 
 const char plchost_application_name[] = "located";
+const char plchost_scheduler[] = "";
 const unsigned int plchost_place_count = 11;
 const struct plchost_place plchost_places[] = {
     {"__IX0_0", 'I', 1, 0, 0, 0, &go},   {"__IW1", 'I', 2, -1, 0, 2, &raw},
