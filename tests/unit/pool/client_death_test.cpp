@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -311,8 +312,10 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   const PoolView view(segment->bytes(), kRoom);
   // Processes with a sanitizer take long to begin; each instruction is met without one.
   constexpr unsigned kRounds = kSanitized ? 50 : 500;
-  constexpr unsigned kSlower = kSanitized ? 10 : 1;
-  // On a busy machine some of them die before they are clients.
+  constexpr unsigned kSlowest = 20;
+  unsigned slower = kSanitized ? 10 : 1;
+  // On a busy machine some of them die before they are clients: the next ones have more time.
+  std::uint64_t departed = 0;
   const auto enough = [&] { return view.header().departed.load() > kRounds; };
   for (unsigned round = 0; round < kRounds || (!enough() && round < 4 * kRounds); ++round) {
     std::array<pid_t, 3> children{};
@@ -321,8 +324,10 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
       if (child == 0) storm(name_.get(), round * 31 + i);
       ++i;
     }
-    std::this_thread::sleep_for(std::chrono::microseconds(kSlower * (400 + 53 * (round % 61))));
+    std::this_thread::sleep_for(std::chrono::microseconds(slower * (400 + 53 * (round % 61))));
     for (const pid_t child : children) kill_and_reap(child);
+    const std::uint64_t before = std::exchange(departed, view.header().departed.load());
+    if (departed == before) slower = std::min(slower + 1, kSlowest);
     // Nothing is held by the dead, and each kept memory has its file and no other one has.
     std::size_t memories = 0;
     for (const auto all = pool_.list().value(); const ObjectInfo& info : all) {
