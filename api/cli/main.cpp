@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <optional>
 #include <ranges>
 #include <span>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -23,6 +26,20 @@
 #include "shm/log/log.hpp"
 
 namespace {
+
+// An output that cannot be written is a failure, unless its reader has had enough.
+int carry_out(const plchost::Action& action) {
+  int code = plchost::kExitFailed;
+  try {
+    code = action();
+    errno = 0;
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  } catch (const std::system_error& error) {  // of fmt::print
+    errno = error.code().value();
+  }
+  if (errno == EPIPE) return code;
+  return plchost::CliSession::fail({plchost::ErrorCode::system, errno, "cannot write the output"});
+}
 
 void add_options(CLI::App& app, plchost::CliOptions& options) {
   app.add_option("--host", options.hosts.host,
@@ -226,10 +243,10 @@ int main(int argc, char** argv) {
   session.options.timeout_given = app.count("--timeout") > 0;
   const std::string& colour = session.options.colour;
   session.options.coloured = colour == "always" || (colour == "auto" && plchost::shows_colours());
-  if (!session.options.watch) return action();
+  if (!session.options.watch) return carry_out(action);
   if (!app.got_subcommand("list") && !app.got_subcommand("show")) {
     fmt::print(stderr, "plcctl: --watch goes with list and show\n");
     return plchost::kExitUsage;
   }
-  return plchost::repeat({.every_s = session.options.every_s}, action);
+  return carry_out([&] { return plchost::repeat({.every_s = session.options.every_s}, action); });
 }

@@ -21,6 +21,7 @@ constexpr int kAttempts = 100;
 
 /// A name beside `path` that others can only guess, and that does no harm if they do.
 std::string name_beside(const std::string& path, int attempt) {
+  if (path.empty()) return "-o names no file";
   const fs::path file(path);
   return file.parent_path() / fmt::format(".{}.{}-{}", file.filename().string(), ::getpid(), attempt);
 }

@@ -261,7 +261,13 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
     }
   }
   const std::string version = reply.code == ErrorCode::ok ? loaded_text() : std::string();
-  finish(reply.code, version.empty() ? reply.text : fmt::format("{}, {}", version, reply.text));
+  std::string text = version.empty() ? reply.text : fmt::format("{}, {}", version, reply.text);
+  const bool is_addition = request.verb == ControlVerb::stop || request.verb == ControlVerb::set_scheduler;
+  if (reply.code == ErrorCode::ok && is_addition && !text.empty()) {
+    text = fmt::format("{}: {}; {}", config_.name, done_text(operation_of(request.verb), request.argument),
+                       text);
+  }
+  finish(reply.code, text);
   if (reply.code != ErrorCode::ok) look_again();
 }
 

@@ -166,9 +166,12 @@ std::string ManagedInstance::text_of_beginning(EndCause cause) const {
 }
 
 void ManagedInstance::ended_unwatched() {
+  const auto left = host_.runtime();
+  const std::string forces = ended_forces_text(left ? left->forces : 0);
   host_.end_outputs();
   start_kind_ = StartKind::after_fault;
-  ended({.cause = EndCause::unwatched}, "ended while no manager ran");
+  ended({.cause = EndCause::unwatched},
+        fmt::format("ended while no manager ran{}{}", forces.empty() ? "" : "; ", forces));
 }
 
 // Its policy is never to start it again, so a process that is still being set up is waited for instead.
@@ -243,6 +246,9 @@ void ManagedInstance::tell_when_kept(const Operation& done, std::string text, co
                                        done_text(operation_of(done.request.verb), done.request.argument))
                          : text;
   if (!more.empty()) said = text = said + "; " + more;
+  // A command that only the process carries out is written nowhere: no disk is waited for.
+  if (operation_of(done.request.verb).place == OperationPlace::instance && !events)
+    return done.reply(ControlReply{.number = done.request.number, .code = ErrorCode::ok, .text = text});
   own_.wishes.when_kept(
       [reply = done.reply, number = done.request.number, text, said](const std::string& problem) {
         const std::string all = fmt::format("{}; a power cut would undo it: {}", said, problem);

@@ -23,6 +23,39 @@ Json list_in(const Json& arguments, const char* key) {
   return found != arguments.end() && found->is_array() ? *found : Json::array();
 }
 
+// A part of a command, which is words with blanks between. Empty: it is not there.
+Result<std::string> part_in(const Json& wanted, const char* key) {
+  const auto found = wanted.find(key);
+  if (found == wanted.end() || found->is_null()) return std::string();
+  if (!found->is_string()) return failure(ErrorCode::invalid_argument, fmt::format("{} is no text", key));
+  const auto text = found->get<std::string>();
+  if (!is_printable_utf8(text))
+    return failure(ErrorCode::invalid_argument, fmt::format("{} has characters that cannot be printed", key));
+  return text;
+}
+
+// Only the last part of a command may have the words of the others in it.
+Result<std::string> inner_part_in(const Json& wanted, const char* key) {
+  PLCHOST_TRY_ASSIGN(auto text, part_in(wanted, key));
+  for (const std::string_view word : {" hits ", " if ", " log "}) {
+    if (text.find(word) != std::string::npos)
+      return failure(ErrorCode::invalid_argument, fmt::format("{}: '{}' is not allowed in it", key, word));
+  }
+  return text;
+}
+
+// "PLACE hits COUNT if CONDITION log TEXT"
+Result<std::string> order_of(const std::string& place, const Json& wanted) {
+  PLCHOST_TRY_ASSIGN(const auto hits, inner_part_in(wanted, "hitCondition"));
+  PLCHOST_TRY_ASSIGN(const auto condition, inner_part_in(wanted, "condition"));
+  PLCHOST_TRY_ASSIGN(const auto log, part_in(wanted, "logMessage"));
+  std::string order = "break " + place;
+  if (!hits.empty()) order += " hits " + hits;
+  if (!condition.empty()) order += " if " + condition;
+  if (!log.empty()) order += " log " + log;
+  return order;
+}
+
 std::string last_name(std::string_view path) {
   return std::string(path.substr(path.find_last_of("/\\") + 1));
 }
@@ -122,11 +155,8 @@ void DapSession::remove_of(const std::string& key) {
 }
 
 Json DapSession::set_one(const std::string& key, const std::string& place, const Json& wanted) {
-  std::string order = "break " + place;
-  if (const auto hits = text_in(wanted, "hitCondition"); !hits.empty()) order += " hits " + hits;
-  if (const auto condition = text_in(wanted, "condition"); !condition.empty()) order += " if " + condition;
-  if (const auto log = text_in(wanted, "logMessage"); !log.empty()) order += " log " + log;
-  const auto answer = link_.command(order);
+  const auto order = order_of(place, wanted);
+  const auto answer = order ? link_.command(*order) : Result<Json>(std::unexpected(order.error()));
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
   ids_[key].push_back(id);

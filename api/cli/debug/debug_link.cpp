@@ -67,8 +67,14 @@ Result<nlohmann::json> DebugLink::command(const std::string& text) {
 }
 
 Result<DebugLink::Part> DebugLink::part(std::size_t offset) {
-  PLCHOST_TRY_ASSIGN(const auto text, call(static_cast<std::int32_t>(ControlVerb::read_debug),
-                                           fmt::format("{} {}", number_, offset)));
+  auto answer =
+      call(static_cast<std::int32_t>(ControlVerb::read_debug), fmt::format("{} {}", number_, offset));
+  if (!answer && answer.error().code == ErrorCode::not_found && number_ != 0) {
+    return failure(
+        ErrorCode::wrong_state,
+        "the debug session is over: the process of the instance has ended, or has another application");
+  }
+  PLCHOST_TRY_ASSIGN(const auto text, std::move(answer));
   Part part;
   const char* const last = text.data() + text.size();
   const auto version = std::from_chars(text.data(), last, part.version);

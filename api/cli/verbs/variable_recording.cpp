@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -78,23 +79,30 @@ int record(CliSession& session, const RecordArguments& arguments) {
   VariableSampler sampler(session, *host, arguments.instance,
                           {.patterns = arguments.names, .forced = false, .after = 0});
   std::unique_ptr<std::FILE, CloseFile> file;
-  if (!arguments.file.empty()) {
-    file.reset(std::fopen(arguments.file.c_str(), "we"));
-    if (!file) return CliSession::fail({ErrorCode::system, errno, "cannot write " + arguments.file});
-  }
-  Recording recording(file ? file.get() : stdout);
+  std::optional<Recording> recording;
+  // With the first sample: a command that is refused leaves an earlier recording as it is.
+  const auto begin_file = [&]() -> Result<void> {
+    if (recording) return {};
+    if (!arguments.file.empty()) {
+      file.reset(std::fopen(arguments.file.c_str(), "we"));
+      if (!file) return failure(ErrorCode::system, "cannot write " + arguments.file, errno);
+    }
+    recording.emplace(file ? file.get() : stdout);
+    return {};
+  };
   const TimePoint begin = MonotonicClock::now();
   const auto length =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.duration_s));
   Result<void> written;
   const int code =
       sample_again_and_again(sampler, SampleTimes(arguments.interval_s), [&](const VariableListing& sample) {
-        written = recording.add(sample);
+        written = begin_file();
+        if (written) written = recording->add(sample);
         return written && (arguments.duration_s <= 0 || MonotonicClock::now() - begin < length);
       });
   if (!written) return CliSession::fail(written.error());
-  if (file && code == kExitDone)
-    session.say(fmt::format("{} samples in {}", recording.samples(), arguments.file));
+  if (file && recording && code == kExitDone)
+    session.say(fmt::format("{} samples in {}", recording->samples(), arguments.file));
   return code;
 }
 

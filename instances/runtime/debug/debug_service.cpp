@@ -67,7 +67,7 @@ Result<std::string> DebugService::obey(std::string_view command, TimePoint now) 
 Result<std::string> DebugService::begin_session(bool take, TimePoint now) {
   if (session_ != 0 && now - seen_ < kLease && !take) {
     return failure(ErrorCode::busy,
-                   fmt::format("a debugger has session {}; 'attach take' ends it", session_));
+                   fmt::format("a debugger has session {}; 'plcctl debug --take' ends it", session_));
   }
   if (session_ != 0) end_session("another debugger takes over");
   session_ = ++last_session_;
@@ -86,7 +86,10 @@ Result<std::string> DebugService::carry_out(std::string_view verb, std::string_v
   if (verb == "pause") return pause(rest);
   if (verb == "continue" || verb == "step" || verb == "next" || verb == "out" || verb == "until")
     return go_on(verb, rest);
-  if (verb == "halts" && (rest == "all" || rest == "one")) {
+  if (verb == "halts") {
+    if (rest != "all" && rest != "one")
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("'{}' cannot be halted by a breakpoint: 'all' and 'one' can", shown(rest)));
     halt_all_ = rest == "all";
     return std::string("{}");
   }

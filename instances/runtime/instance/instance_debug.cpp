@@ -22,8 +22,12 @@ Result<void> Instance::attach_debugger() {
   if (options_.launch.no_debug)
     return failure(ErrorCode::refused,
                    "the application is a debug build, and this host says allow_debug = false");
-  PLCHOST_TRY_ASSIGN(auto page, DebugPage::create(options_.launch.pool, options_.launch.name));
-  debug_page_.emplace(std::move(page));
+  auto page = DebugPage::create(options_.launch.pool, options_.launch.name);
+  if (!page) {  // the machine runs all the same
+    spdlog::error("no task can be halted by a debugger: {}", page.error().describe());
+    return {};
+  }
+  debug_page_.emplace(*std::move(page));
   PLCHOST_TRY(
       host_->debug().attach({.tasks = tasks_.get(),
                              .pous = [this]() -> const auto& { return host_->declaration().pous; },

@@ -300,10 +300,12 @@ void RetainKeeper::save() {
   if (lost_) return count_unsaved();
   const Taken taken = take_snapshot();
   if (notice_loss()) return count_unsaved();
-  tell(Fault::cycles, taken == Taken::all ? ""
-                      : taken == Taken::none
-                          ? "the tasks were always in a cycle; raise [Retain] PostponeMs"
-                          : "the tasks of some areas were always in a cycle; raise [Retain] PostponeMs");
+  tell(Fault::cycles,
+       taken == Taken::all ? ""
+       : taken == Taken::none
+           ? "the tasks were always in a cycle, or a debugger halts one; raise [Retain] PostponeMs"
+           : "the tasks of some areas were always in a cycle, or a debugger halts one; raise "
+             "[Retain] PostponeMs");
   if (taken != Taken::all) count_unsaved();
   if (taken == Taken::none || (image_.data == written_ && saves() > 0)) return;
   if (write_image() && taken == Taken::all) saves_.store(saves() + 1, std::memory_order_relaxed);

@@ -1,11 +1,13 @@
 // plchost-modbus between images and real devices of libmodbus, which stall, vanish and answer garbage.
 
+#include <array>
 #include <csignal>
 #include <memory>
 #include <string>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include "tests/integration/modbus/device_of_a_test.hpp"
 #include "tests/integration/modbus/modbus_peer.hpp"
@@ -146,6 +148,34 @@ TEST(ModbusDevices, TheSafeStateOfAPlcIsNoSilence) {
   const int requests = peer.requests();
   ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
   EXPECT_EQ(peer.holding(7), 8);
+}
+
+// The end of a host removes its images.
+TEST(ModbusDevices, TheSafeStateHoldsWhenTheImageIsGoneUntilAnotherPlcWrites) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
+  plant.show_safe(PLC_IMAGE_STATE_ENDED, 8);
+  ASSERT_TRUE(eventually([&] { return peer.holding(7) == 8; })) << sut.log();
+  const std::string path = fmt::format("/dev/shm/{}.memory.t.out", plant.pool());
+  ASSERT_EQ(::unlink(path.c_str()), 0);
+  int requests = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 200; }));  // of 10 ms and more
+  EXPECT_EQ(peer.holding(7), 8);
+  EXPECT_NE(::access(path.c_str(), F_OK), 0);
+  plc_image next{};
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "t.out", Plant::kSize, PLC_IMAGE_WRITE, &next), 0);
+  requests = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));
+  EXPECT_EQ(peer.holding(7), 8) << "nothing is put out yet";
+  const std::array<std::uint16_t, Plant::kSize / 2> words{43};
+  EXPECT_TRUE(eventually([&] {
+    plc_image_write(&next, words.data());
+    return peer.holding(7) == 43;
+  })) << sut.log();
+  plc_image_close(&next);
+  EXPECT_TRUE(eventually([&] { return sut.logged("the PLC of image 't.out' is silent"); }));
 }
 
 // A device whose PLC was stopped or killed was cleared before there were safe states, and still is.

@@ -86,7 +86,22 @@ TEST(ModbusProcess, AKilledProcessLeavesAnImageThatTheNextTakesOver) {
   EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
 }
 
-TEST(ModbusProcess, AnImageWhoseFileIsRemovedIsMadeAnew) {
+// Words of an image that is opened anew.
+testing::AssertionResult first_word_becomes(const Plant& plant, const char* name, std::uint16_t wanted) {
+  plc_image image{};
+  std::array<std::uint16_t, Plant::kSize / 2> words{};
+  const bool opened = eventually(
+      [&] { return plc_image_open(plant.pool().c_str(), name, Plant::kSize, PLC_IMAGE_READ, &image) == 0; });
+  const bool came =
+      opened && eventually([&] {
+        return plc_image_read(&image, words.data(), nullptr) == PLC_IMAGE_OK && words[0] == wanted;
+      });
+  plc_image_close(&image);
+  return came ? testing::AssertionSuccess() : testing::AssertionFailure() << "it is " << words[0];
+}
+
+// The files of a host that has ended are not made again by firmware.
+TEST(ModbusProcess, AnImageWhoseFileIsRemovedIsThatOfTheNextOneWhoMakesIt) {
   Plant plant;
   const HeldPort port;
   ModbusPeer peer(port);
@@ -96,15 +111,21 @@ TEST(ModbusProcess, AnImageWhoseFileIsRemovedIsMadeAnew) {
   const std::string path = fmt::format("/dev/shm/{}.memory.t.in", plant.pool());
   ASSERT_EQ(::unlink(path.c_str()), 0);
   measure(peer, 6);
-  plc_image anew{};
-  ASSERT_TRUE(eventually([&] { return ::access(path.c_str(), F_OK) == 0; }));
-  ASSERT_TRUE(eventually([&] {
-    return plc_image_open(plant.pool().c_str(), "t.in", Plant::kSize, PLC_IMAGE_READ, &anew) == 0;
-  }));
-  std::array<std::uint16_t, Plant::kSize / 2> words{};
-  EXPECT_TRUE(eventually(
-      [&] { return plc_image_read(&anew, words.data(), nullptr) == PLC_IMAGE_OK && words[0] == 6; }));
-  plc_image_close(&anew);
+  ASSERT_TRUE(eventually([&] { return plant.input_word(0) == 6; })) << "a process that has it open sees all";
+  EXPECT_NE(::access(path.c_str(), F_OK), 0);
+  EXPECT_TRUE(first_word_becomes(plant, "t.in", 6));
+}
+
+TEST(ModbusProcess, AnImageWhoseFileIsCutShortIsOpenedAnew) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  measure(peer, 5);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(eventually([&] { return plant.input_word(0) == 5; })) << sut.log();
+  ASSERT_EQ(::truncate(fmt::format("/dev/shm/{}.memory.t.in", plant.pool()).c_str(), 0), 0);
+  measure(peer, 6);
+  EXPECT_TRUE(first_word_becomes(plant, "t.in", 6)) << sut.log();
 }
 
 TEST(ModbusProcess, ABadConfigurationIsRefusedWithItsLine) {

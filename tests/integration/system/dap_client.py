@@ -73,6 +73,9 @@ def story(port):
                       breakpoints=[{"line": 13, "condition": "n > 3"}, {"line": 900}])["breakpoints"]
     assert made[0]["verified"] and made[0]["line"] == 14, made
     assert not made[1]["verified"] and "statement" in made[1]["message"], made
+    for wrong in ({"condition": "n > 5000 log n"}, {"condition": 5}, {"logMessage": "a\nb"}, {"hitCondition": ["="]}):
+        made = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Main", **wrong}])["breakpoints"]
+        assert not made[0]["verified"] and list(wrong)[0] in made[0]["message"], made
     client.ask("setExceptionBreakpoints", filters=[])
     client.ask("configurationDone")
     threads = {one["name"]: one["id"] for one in client.ask("threads")["threads"]}

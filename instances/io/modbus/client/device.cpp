@@ -84,13 +84,26 @@ LinkResult Device::write_output(Output& output) {
 }
 
 // False: nothing is to be written.
-bool Device::outputs_of(const Output& output, MapValues& values) const {
-  bool wanted = true;
+bool Device::outputs_of(Output& output, MapValues& values) {
+  bool silent = false;
   output.image->look([&](std::span<const std::byte> bytes, Duration silence) {
-    if (silence < config_.silent_after) return values.read_from(*output.map, bytes);
-    wanted = config_.when_silent == LossPolicy::zero;
+    silent = silence >= config_.silent_after;
+    if (!silent) values.read_from(*output.map, bytes);
   });
-  return wanted;
+  tell_silence(output, silent);
+  return !silent || config_.when_silent == LossPolicy::zero;
+}
+
+void Device::tell_silence(Output& output, bool silent) const {
+  if (std::exchange(output.is_silent, silent) == silent) return;
+  if (silent) {
+    spdlog::warn("device '{}': the PLC of image '{}' is silent: outputs from address {} {}", config_.name,
+                 output.image->name(), output.map->address,
+                 config_.when_silent == LossPolicy::zero ? "become zero" : "stay as they are");
+  } else {
+    spdlog::info("device '{}': the PLC of image '{}' says the outputs from address {}", config_.name,
+                 output.image->name(), output.map->address);
+  }
 }
 
 LinkResult Device::read_inputs() {

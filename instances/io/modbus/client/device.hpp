@@ -49,11 +49,13 @@ class Device {
     MapValues written;
     bool is_written = false;  ///< since the connection was made
     TimePoint written_at;
+    bool is_silent = true;  ///< its PLC; at first nothing was put out
   };
 
   [[nodiscard]] LinkResult write_outputs();
   [[nodiscard]] LinkResult write_output(Output& output);
-  [[nodiscard]] bool outputs_of(const Output& output, MapValues& values) const;
+  [[nodiscard]] bool outputs_of(Output& output, MapValues& values);
+  void tell_silence(Output& output, bool silent) const;
   [[nodiscard]] LinkResult read_inputs();
   void publish_inputs(TimePoint now);
   void make_safe();

@@ -16,8 +16,16 @@ Result<std::unique_ptr<InputImage>> InputImage::open(const std::string& pool, co
 Result<void> InputImage::repair() {
   const std::lock_guard lock(mutex_);
   if (!image_.gone()) return {};
+  // With the pool of a host that has ended its file goes; the next one makes it anew.
+  if (!image_.lost() && !ProcessImage::exists(pool_, name_)) return {};
   const auto size = static_cast<std::uint32_t>(bytes_.size());
-  PLCHOST_TRY_ASSIGN(image_, ProcessImage::open(pool_, name_, size, PLC_IMAGE_WRITE));
+  image_.unlock();  // it may be the same file, cut short
+  auto opened = ProcessImage::open(pool_, name_, size, PLC_IMAGE_WRITE);
+  if (!opened) {
+    image_.lock();
+    return std::unexpected(std::move(opened).error());
+  }
+  image_ = std::move(*opened);
   plc_image_write(&image_.image(), bytes_.data());
   return {};
 }

@@ -34,7 +34,8 @@ class InputImage {
     look(std::span<const std::byte>(bytes_));
   }
 
-  /// If its file was removed or cut short, makes it anew with the same values. An error: it is still so.
+  /// If its file was cut short, or there is another one of that name, opens it with the same values. An
+  /// error: it is still so.
   [[nodiscard]] Result<void> repair();
 
  private:

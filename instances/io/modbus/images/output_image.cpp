@@ -28,8 +28,12 @@ void OutputImage::repair() {
   if (now < looked_at_ + kLookPause) return;
   looked_at_ = now;
   if (!image_.gone()) return;
+  // With the pool of a host that has ended its file goes. The last word of its writer holds until another one
+  // has said something.
+  if (!image_.lost() && !ProcessImage::exists(pool_, name_)) return;
   auto opened = ProcessImage::open(pool_, name_, static_cast<std::uint32_t>(bytes_.size()), PLC_IMAGE_READ);
-  if (opened) image_ = std::move(*opened);  // else the age tells it
+  if (!opened) return;  // the age tells it
+  if (image_.lost() || opened->is_written()) image_ = std::move(*opened);
 }
 
 }  // namespace plchost::modbus

@@ -21,6 +21,8 @@ class OutputImage {
   [[nodiscard]] static Result<std::unique_ptr<OutputImage>> open(const std::string& pool,
                                                                  const std::string& name, std::uint32_t size);
 
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+
   /// Calls `look` with the bytes that are shown and the time for which their writer is silent. It is silent
   /// if it runs and publishes nothing, or gives no sign. One that has stopped or ended in order is not: it
   /// says which outputs hold from then on. Duration::max(): nothing was written yet.

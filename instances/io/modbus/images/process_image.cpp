@@ -1,9 +1,12 @@
 #include "instances/io/modbus/images/process_image.hpp"
 
+#include <array>
 #include <cerrno>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include "shm/base/names.hpp"
 
@@ -66,6 +69,19 @@ Result<ProcessImage> ProcessImage::open(const std::string& pool, const std::stri
     return failure(ErrorCode::full, fmt::format("more than {} memories of others", MemoryGuard::kMost));
   }
   return opened;
+}
+
+bool ProcessImage::exists(const std::string& pool, const std::string& name) {
+  std::array<char, PLC_IMAGE_PATH_SIZE> path{};
+  return plc_image_path(pool.c_str(), name.c_str(), path.data()) == 0 && ::access(path.data(), F_OK) == 0;
+}
+
+void ProcessImage::unlock() const noexcept {
+  (void)::flock(image_.descriptor, LOCK_UN);
+}
+
+void ProcessImage::lock() const noexcept {
+  (void)::flock(image_.descriptor, LOCK_EX | LOCK_NB);
 }
 
 bool ProcessImage::gone() const {

@@ -25,7 +25,16 @@ class ProcessImage {
 
   /// The name leads to another file, or to none, or the file was cut short: open it anew.
   [[nodiscard]] bool gone() const;
+  /// Its memory was taken away: nothing that is read or written counts.
+  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  /// The name leads to a file.
+  [[nodiscard]] static bool exists(const std::string& pool, const std::string& name);
+  /// Another image of this name can be opened for writing meanwhile, or not any more.
+  void unlock() const noexcept;
+  void lock() const noexcept;
   [[nodiscard]] const plc_image& image() const noexcept { return image_; }
+  /// Some image was published.
+  [[nodiscard]] bool is_written() const noexcept { return plc_image_age_ns(&image_) != PLC_IMAGE_NEVER; }
   /// The image that is shown. False: none yet, or it was overtaken each time.
   [[nodiscard]] bool read(std::span<std::byte> bytes) const noexcept {
     return plc_image_read(&image_, bytes.data(), nullptr) == PLC_IMAGE_OK;
