@@ -40,7 +40,7 @@ void read_messages(std::string_view text) {
   }
 }
 
-// What is accepted can be evaluated, in a frame with variables and in one without.
+// An accepted one can be evaluated, in a frame with variables and in one without.
 void make_breakpoint(std::string_view text) {
   const auto order = BreakpointOrder::parse(text);
   if (!order || order->place.empty()) return;
