@@ -42,8 +42,8 @@ class Build {
   explicit Build(const BuildOrder& order) : order_(order), context_(order) {}
 
   BuildReport run() {
-    if (read_files() && keeps_apart() && choose() && can_be_debugged() && translator_->read() &&
-        is_one_configuration() && can_be_planned() && outputs_are_free() && translator_->translate()) {
+    if (read_files() && keeps_apart() && choose() && translator_->read() && is_one_configuration() &&
+        can_be_planned() && outputs_are_free() && translator_->translate()) {
       for (const iec::Resource& resource : configuration().resources) make(resource);
       if (context_.good()) publish();
     }
@@ -54,12 +54,6 @@ class Build {
  private:
   [[nodiscard]] const iec::Configuration& configuration() const {
     return context_.project.configurations.front();
-  }
-
-  bool can_be_debugged() {
-    if (order_.debug && translator_->compiler() != iec::Compiler::matiec)
-      context_.fail("a debug build needs MATIEC: add --compiler matiec");
-    return context_.good();
   }
 
   bool read_files() {

@@ -121,17 +121,16 @@ class MatiecTranslator : public Translator {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return false;
     auto made = matiec::with_statements(*code, joined);
-    for (matiec::DebugPou& pou : made.pous) {
+    for (iec::DebugPou& pou : made.pous) {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }
     pous_ = std::move(made.pous);
     return context_.has(context_.folder().replace(kCode, made.text)) &&
-           context_.has(
-               context_.folder().write(std::string(matiec::kDebugFile), matiec::debug_header(pous_)));
+           context_.has(context_.folder().write(std::string(iec::kDebugFile), iec::debug_header(pous_)));
   }
 
   BuildContext& context_;
-  std::vector<matiec::DebugPou> pous_;  // of a debug build
+  std::vector<iec::DebugPou> pous_;  // of a debug build
   matiec::Compiler compiler_;
   std::vector<std::string> words_;
   std::vector<matiec::Located> located_;

@@ -10,6 +10,7 @@
 #include "instances/adapters/strucpp/compiler.hpp"
 #include "instances/adapters/strucpp/glue.hpp"
 #include "instances/adapters/strucpp/plan_file.hpp"
+#include "instances/adapters/strucpp/statements.hpp"
 #include "instances/adapters/translator.hpp"
 
 namespace plchost {
@@ -56,7 +57,7 @@ class StrucppTranslator : public Translator {
   bool translate() override {
     auto c = context_.words_of("CC", "cc");
     auto cpp = context_.words_of("CXX", "c++");
-    if (!c || !cpp) return false;
+    if (!c || !cpp || (context_.order.debug && !instrument())) return false;
     words_ = *std::move(cpp);
     find_flags();
     const std::string adapters = context_.adapters();
@@ -69,7 +70,7 @@ class StrucppTranslator : public Translator {
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
     return strucpp::write_glue(context_.project, context_.project.configurations.front(), resource, files_,
-                               symbols_);
+                               symbols_, pous_);
   }
 
   bool compile(const std::string& name, const std::string& glue, const fs::path& made) override {
@@ -79,11 +80,13 @@ class StrucppTranslator : public Translator {
     std::vector<std::string> sources{file};
     for (const fs::path source : context_.application_files())
       sources.push_back(source.stem().string() + ".o");
+    std::vector<std::string> folders{adapters + "/application", adapters + "/strucpp", compiler_.headers,
+                                     context_.folder().path()};
+    if (context_.order.debug) folders.push_back(adapters);  // plc_debug.h
     return context_.compile("the C++ compiler", words_,
                             {.kind = CompileOrder::Kind::cpp_application,
                              .sources = std::move(sources),
-                             .folders = {adapters + "/application", adapters + "/strucpp", compiler_.headers,
-                                         context_.folder().path()},
+                             .folders = std::move(folders),
                              .output = made,
                              .flags = flags_});
   }
@@ -96,6 +99,21 @@ class StrucppTranslator : public Translator {
     probe.insert(probe.end(), {flag, "-fsyntax-only", "-x", "c++", "/dev/null"});
     const auto end = run_program(probe, context_.folder().path(), {.time = context_.order.translate_limit});
     if (end && end->success()) flags_.push_back(flag);
+  }
+
+  bool instrument() {
+    std::vector<std::string> codes;
+    for (const std::string& file : files_) {
+      auto code = context_.folder().read(file);
+      if (!context_.has(code)) return false;
+      codes.push_back(*std::move(code));
+    }
+    auto made = strucpp::with_statements(codes, context_.project);
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (!context_.has(context_.folder().replace(files_[i], made.texts[i]))) return false;
+    }
+    pous_ = std::move(made.pous);
+    return context_.has(context_.folder().write(std::string(iec::kDebugFile), iec::debug_header(pous_)));
   }
 
   bool write_order() {
@@ -149,6 +167,7 @@ class StrucppTranslator : public Translator {
   strucpp::Compiler compiler_;
   std::vector<std::string> files_;
   std::vector<strucpp::PlannedSymbol> symbols_;
+  std::vector<iec::DebugPou> pous_;  // of a debug build
   std::vector<std::string> words_;
   std::vector<std::string> flags_;
 };

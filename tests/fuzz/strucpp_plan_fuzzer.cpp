@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "instances/adapters/iec/debug_pous.hpp"
 #include "instances/adapters/iec/glue.hpp"
 #include "instances/adapters/strucpp/glue.hpp"
 #include "instances/adapters/strucpp/plan_file.hpp"
@@ -50,9 +51,10 @@ void read(std::string_view text) {
     if (plan.error().message.empty() || plan.error().message.size() > 2'000) std::abort();
     return;
   }
+  const std::array<iec::DebugPou, 1> pous{{{.name = "MAIN", .file = "a.st", .lines = {1}}}};
   for (const iec::Configuration& configuration : plan->project.configurations) {
     for (const iec::Resource& resource : configuration.resources)
-      (void)strucpp::write_glue(plan->project, configuration, resource, plan->files, plan->symbols);
+      (void)strucpp::write_glue(plan->project, configuration, resource, plan->files, plan->symbols, pous);
   }
 }
 

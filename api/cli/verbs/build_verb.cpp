@@ -69,8 +69,7 @@ void add_build_verb(const Command& plcctl, CliSession& session) {
               "folder of the built compiler STruC++ (else by PLCHOST_STRUCPP, else by strucpp in PATH)", "")
       .option("--keep", order->keep,
               "leave the files between in this folder: a new or empty one, or one of an earlier --keep", "")
-      .flag("--debug", order->debug,
-            "a debug build: 'plcctl debug' can halt its tasks at each statement; with MATIEC");
+      .flag("--debug", order->debug, "a debug build: 'plcctl debug' can halt its tasks at each statement");
 }
 
 }  // namespace plchost

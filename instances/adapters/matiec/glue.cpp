@@ -27,7 +27,7 @@ std::string name_in_c(const iec::Resource& resource) {
 class Writer : public iec::GlueWriter {
  public:
   Writer(const iec::Project& project, const iec::Configuration& configuration, const iec::Resource& resource,
-         const std::vector<Located>& located, std::span<const DebugPou> pous)
+         const std::vector<Located>& located, std::span<const iec::DebugPou> pous)
       : GlueWriter(project, configuration, resource, iec::Compiler::matiec), located_(located), pous_(pous) {}
 
  private:
@@ -147,17 +147,16 @@ class Writer : public iec::GlueWriter {
   }
   // In a debug build: the POUs, and where their variables are.
   void write_debugging(const Symbols& symbols) {
-    print("int plchost_declare_debugging(void) {{\n  int good = 1;\n");
-    for (std::size_t i = 0; i < pous_.size(); ++i)
-      print("  good = good && plc_debug_declare_pou(&plchost_pou_{}) == ERR_OK;\n", i);
+    std::vector<iec::DebugInstance> instances;
     for (const SymbolInstance& instance : symbols.instances) {
-      const auto pou =
-          std::ranges::find(pous_, instance.type, [](const DebugPou& known) { return folded(known.name); });
+      const auto pou = std::ranges::find(pous_, instance.type,
+                                         [](const iec::DebugPou& known) { return folded(known.name); });
       if (pou == pous_.end()) continue;
-      print("  good = good && plc_debug_declare_instance(&plchost_pou_{}, &{}, \"{}\") == ERR_OK;\n",
-            pou - pous_.begin(), instance.value, instance.path);
+      instances.push_back({.pou = static_cast<std::size_t>(pou - pous_.begin()),
+                           .value = instance.value,
+                           .path = instance.path});
     }
-    print("  return good;\n}}\n");
+    print("{}", iec::debug_declarations(pous_, instances));
   }
   void write_symbol(const Symbol& symbol) {
     const auto text = [](const std::string& name) {
@@ -183,7 +182,7 @@ class Writer : public iec::GlueWriter {
   }
 
   const std::vector<Located>& located_;
-  std::span<const DebugPou> pous_;
+  std::span<const iec::DebugPou> pous_;
   std::vector<const Located*> pointers_;                             // for each place
   std::map<Place, std::size_t> numbers_;                             // of places
   std::map<std::pair<Place, std::size_t>, std::string> own_values_;  // of inputs, by the number of the task
@@ -194,7 +193,7 @@ class Writer : public iec::GlueWriter {
 
 iec::Glue write_glue(const iec::Project& project, const iec::Configuration& configuration,
                      const iec::Resource& resource, const std::vector<Located>& located,
-                     std::span<const DebugPou> pous) {
+                     std::span<const iec::DebugPou> pous) {
   return Writer(project, configuration, resource, located, pous).write();
 }
 

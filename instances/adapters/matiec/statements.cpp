@@ -26,16 +26,11 @@ class Instrumenter {
   Instrumenter(std::string_view code, const JoinedSource& source) : code_(code), source_(source) {}
 
   DebugCode run() {
-    made_.text = fmt::format("#include \"{}\"\n", kDebugFile);
+    made_.text = fmt::format("#include \"{}\"\n", iec::kDebugFile);
     while (!code_.empty()) {
       const std::size_t end = std::min(code_.find('\n'), code_.size());
       take(code_.substr(0, end));
       code_.remove_prefix(std::min(end + 1, code_.size()));
-    }
-    for (DebugPou& pou : made_.pous) {
-      std::ranges::sort(pou.lines);
-      const auto twice = std::ranges::unique(pou.lines);
-      pou.lines.erase(twice.begin(), twice.end());
     }
     return std::move(made_);
   }
@@ -74,10 +69,10 @@ class Instrumenter {
     if (!number_) {
       number_ = made_.pous.size();
       made_.pous.push_back({.name = name_, .file = place.file, .lines = {}});
-      made_.text.insert(*opened_at_, fmt::format("  PLC_ENTER(plchost_pou_{}, {});\n", *number_, self_));
+      made_.text.insert(*opened_at_, iec::debug_enter(*number_, self_));
     }
     made_.pous[*number_].lines.push_back(place.line);
-    made_.text += fmt::format("PLC_STATEMENT({}u);\n", place.line);
+    made_.text += iec::debug_statement(place.line);
   }
 
   std::string_view code_;
@@ -90,30 +85,10 @@ class Instrumenter {
   std::optional<std::size_t> number_;     // of its DebugPou
 };
 
-std::string in_quotes(std::string_view text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += c;
-  }
-  return quoted + '"';
-}
-
 }  // namespace
 
 DebugCode with_statements(std::string_view code, const JoinedSource& source) {
   return Instrumenter(code, source).run();
-}
-
-std::string debug_header(const std::vector<DebugPou>& pous) {
-  std::string text = "/* Written by plcctl build application. */\n#include \"plc_debug.h\"\n";
-  for (std::size_t i = 0; i < pous.size(); ++i) {
-    text += fmt::format(
-        "static const unsigned int plchost_lines_{0}[] = {{{1}u}};\n"
-        "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u}};\n",
-        i, fmt::join(pous[i].lines, "u, "), pous[i].name, in_quotes(pous[i].file), pous[i].lines.size());
-  }
-  return text;
 }
 
 }  // namespace plchost::matiec

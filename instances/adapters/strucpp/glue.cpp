@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/strucpp/instances.hpp"
 #include "instances/adapters/strucpp/symbols.hpp"
 
 namespace plchost::strucpp {
@@ -18,14 +19,17 @@ using iec::folded;
 class Writer : public iec::GlueWriter {
  public:
   Writer(const iec::Project& project, const iec::Configuration& configuration, const iec::Resource& resource,
-         std::span<const std::string> files, std::span<const PlannedSymbol> symbols)
+         std::span<const std::string> files, std::span<const PlannedSymbol> symbols,
+         std::span<const iec::DebugPou> pous)
       : GlueWriter(project, configuration, resource, iec::Compiler::strucpp),
         files_(files),
-        symbols_(symbols) {}
+        symbols_(symbols),
+        pous_(pous) {}
 
  private:
   void write_head() override {
     print("// Written by plcctl build application.\n#include \"plchost_strucpp.hpp\"\n");
+    if (!pous_.empty()) print("#include \"{}\"\n", iec::kDebugFile);
     for (const std::string& file : files_) print("#include \"{}\"\n", file);
     print("\nstrucpp::Configuration_{} g_config;\n", folded(configuration().name));
   }
@@ -80,6 +84,9 @@ class Writer : public iec::GlueWriter {
     print("void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n  (void)use;\n");
     for (const Symbol& symbol : found.all) write_symbol(symbol);
     print("}}\n");
+    if (pous_.empty()) return;
+    print("extern \"C\" {}",
+          iec::debug_declarations(pous_, instances_of(project(), plan(), found.all, pous_)));
   }
   void write_symbol(const Symbol& symbol) {
     const auto text = [](const std::string& name) {
@@ -121,14 +128,15 @@ class Writer : public iec::GlueWriter {
 
   std::span<const std::string> files_;
   std::span<const PlannedSymbol> symbols_;
+  std::span<const iec::DebugPou> pous_;
 };
 
 }  // namespace
 
 iec::Glue write_glue(const iec::Project& project, const iec::Configuration& configuration,
                      const iec::Resource& resource, std::span<const std::string> files,
-                     std::span<const PlannedSymbol> symbols) {
-  return Writer(project, configuration, resource, files, symbols).write();
+                     std::span<const PlannedSymbol> symbols, std::span<const iec::DebugPou> pous) {
+  return Writer(project, configuration, resource, files, symbols, pous).write();
 }
 
 }  // namespace plchost::strucpp

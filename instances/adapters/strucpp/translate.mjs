@@ -273,8 +273,9 @@ class Plan {
 
   pous() {
     const pous = [];
+    const words = { program: 'PROGRAM', function_block: 'FUNCTION_BLOCK(?:\\s+(?:ABSTRACT|FINAL))*', function: 'FUNCTION' };
     const user = (kind, list, className, variables) => {
-      for (const pou of list) pous.push({ kind, name: pou.name, place: placeOf(pou), variables: variables(pou, className(pou)) });
+      for (const pou of list) pous.push({ kind, name: nameAsWritten(pou, words[kind]), place: placeOf(pou), variables: variables(pou, className(pou)) });
     };
     user('program', this.ast.programs, (pou) => `Program_${pou.name}`, (pou, name) => [...this.declared(pou, name), ...this.reached(pou)]);
     user('function_block', this.ast.functionBlocks, (pou) => pou.name, (pou) => this.blockVariables(pou));

@@ -90,7 +90,11 @@ class Debugging : public ::testing::Test {
   std::string stack_after(const std::string& verb) {
     const int before = task("Main").value("halts", 0);
     command(verb + " Main");
-    EXPECT_TRUE(eventually([&] { return task("Main").value("halts", 0) == before + 1; })) << state().dump(2);
+    // The halt is counted a moment before its stack can be seen.
+    EXPECT_TRUE(eventually([&] {
+      const json now = task("Main");
+      return now.value("halts", 0) == before + 1 && !now.value("stack", json::array()).empty();
+    })) << state().dump(2);
     return stack("Main");
   }
   std::uint64_t cycles(const std::string& name) { return process_->task(name)->counters.cycles; }

@@ -60,7 +60,7 @@ TEST(MatiecStatements, GetTheirMacros) {
   EXPECT_THAT(made.pous[0].lines, ElementsAre(2));
   EXPECT_EQ(made.pous[1].name, "MAIN");
   EXPECT_EQ(made.pous[1].file, "b \"1\".st");
-  EXPECT_THAT(made.pous[1].lines, ElementsAre(2, 3));
+  EXPECT_THAT(made.pous[1].lines, ElementsAre(3, 2, 3));
   EXPECT_THAT(made.text, HasSubstr("  INT X)\n{\n  PLC_ENTER(plchost_pou_0, 0);\n"));
   EXPECT_THAT(made.text, HasSubstr("PLC_STATEMENT(2u);\n  TWICE = (X * 2);\n"));
   EXPECT_THAT(made.text,
@@ -70,7 +70,7 @@ TEST(MatiecStatements, GetTheirMacros) {
   EXPECT_THAT(made.text, HasSubstr("void MAIN_init__(MAIN *data__, BOOL retain) {\n  __INIT_VAR"));
   EXPECT_THAT(made.text, HasSubstr("void EMPTY_body__(EMPTY *data__) {\n  return;\n"));
   EXPECT_THAT(made.text, Not(HasSubstr("#line")));
-  const std::string header = debug_header(made.pous);
+  const std::string header = iec::debug_header(made.pous);
   EXPECT_THAT(header, HasSubstr("plchost_lines_1[] = {2u, 3u};"));
   EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u};"));
 }

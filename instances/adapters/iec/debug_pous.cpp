@@ -1,0 +1,92 @@
+#include "instances/adapters/iec/debug_pous.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace plchost::iec {
+
+namespace {
+
+/// Macros of plc_app.h that a program may have as names of its own, or the library of a compiler.
+constexpr std::array<std::string_view, 27> kMacros{"CDECL",
+                                                   "RTS_INVALID_HANDLE",
+                                                   "ERR_OK",
+                                                   "ERR_FAILED",
+                                                   "ERR_PARAMETER",
+                                                   "ERR_NOTINITIALIZED",
+                                                   "ERR_NOBUFFER",
+                                                   "ERR_PENDING",
+                                                   "ERR_BUFFERSIZE",
+                                                   "ERR_NO_OBJECT",
+                                                   "ERR_NOMEMORY",
+                                                   "ERR_DUPLICATE",
+                                                   "ERR_NO_TASK",
+                                                   "Cyclic",
+                                                   "Event",
+                                                   "External",
+                                                   "Freewheeling",
+                                                   "EVT_ExternalEventTaskCreateDone",
+                                                   "EVT_PrepareExternalEventTaskDelete",
+                                                   "EVT_PrepareStart",
+                                                   "CH_INIT",
+                                                   "CH_INIT2",
+                                                   "CH_INIT3",
+                                                   "CH_EXIT3",
+                                                   "CH_EXIT2",
+                                                   "CH_EXIT",
+                                                   "CH_TRIAL"};
+
+std::string in_quotes(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::vector<unsigned> ascending(std::vector<unsigned> lines) {
+  std::ranges::sort(lines);
+  const auto twice = std::ranges::unique(lines);
+  lines.erase(twice.begin(), twice.end());
+  return lines;
+}
+
+}  // namespace
+
+std::string debug_header(std::span<const DebugPou> pous) {
+  std::string text = "/* Written by plcctl build application. */\n#include \"plc_debug.h\"\n";
+  for (const std::string_view macro : kMacros) text += fmt::format("#undef {}\n", macro);
+  for (std::size_t i = 0; i < pous.size(); ++i) {
+    const std::vector<unsigned> lines = ascending(pous[i].lines);
+    text += fmt::format(
+        "static const unsigned int plchost_lines_{0}[] = {{{1}u}};\n"
+        "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u}};\n",
+        i, fmt::join(lines, "u, "), pous[i].name, in_quotes(pous[i].file), lines.size());
+  }
+  return text;
+}
+
+std::string debug_enter(std::size_t pou, std::string_view self) {
+  return fmt::format("  PLC_ENTER(plchost_pou_{}, {});\n", pou, self);
+}
+
+std::string debug_statement(unsigned line) {
+  return fmt::format("PLC_STATEMENT({}u);\n", line);
+}
+
+std::string debug_declarations(std::span<const DebugPou> pous, std::span<const DebugInstance> instances) {
+  std::string text = "int plchost_declare_debugging(void) {\n  int good = 1;\n";
+  for (std::size_t i = 0; i < pous.size(); ++i)
+    text += fmt::format("  good = good && plc_debug_declare_pou(&plchost_pou_{}) == 0;\n", i);
+  for (const DebugInstance& instance : instances) {
+    text += fmt::format("  good = good && plc_debug_declare_instance(&plchost_pou_{}, &{}, \"{}\") == 0;\n",
+                        instance.pou, instance.value, instance.path);
+  }
+  return text + "  return good;\n}\n";
+}
+
+}  // namespace plchost::iec

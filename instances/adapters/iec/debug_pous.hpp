@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace plchost::iec {
+
+/// A POU of a debug build, as plc_debug.h describes it. Each has the variable plchost_pou_N in C.
+struct DebugPou {
+  std::string name;
+  std::string file;
+  std::vector<unsigned> lines;
+};
+
+/// A program or function block with variables in it.
+struct DebugInstance {
+  std::size_t pou = 0;  ///< its number
+  std::string value;    ///< in C, for `&`
+  std::string path;     ///< that the names of its variables begin with: "Main.motor"
+};
+
+/// The file in which the variables of the POUs are.
+inline constexpr std::string_view kDebugFile = "plchost_pous.h";
+
+/// Its contents, in C and C++. A compiler's output behind it may use all names of plc_app.h that do not begin
+/// with PLC_.
+[[nodiscard]] std::string debug_header(std::span<const DebugPou> pous);
+/// The first statement of the code of a POU. `self`: an expression.
+[[nodiscard]] std::string debug_enter(std::size_t pou, std::string_view self);
+/// Goes before the statement of a line.
+[[nodiscard]] std::string debug_statement(unsigned line);
+/// The function plchost_declare_debugging().
+[[nodiscard]] std::string debug_declarations(std::span<const DebugPou> pous,
+                                             std::span<const DebugInstance> instances);
+
+}  // namespace plchost::iec

@@ -1,0 +1,192 @@
+// A debug build of Structured Text, by way of each compiler that is there.
+#include <cstdlib>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/adapters/run_program.hpp"
+#include "tests/integration/instances/debugged_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+/// By the compiler of that name.
+class DebuggedText : public Debugging, public ::testing::WithParamInterface<std::string> {
+ protected:
+  void SetUp() override {
+    const char* const variable = GetParam() == "matiec" ? "PLCHOST_MATIEC" : "PLCHOST_STRUCPP";
+    const char* const folder = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe)
+    if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "needs " << variable;
+  }
+  void build_and_attach(const std::string& text) {
+    const std::string program = sandbox_.folder() + "/press.so";
+    const ProgramEnd built = run_program({PLCCTL, "build", "application", sandbox_.write("press.st", text),
+                                          "-o", program, "--compiler", GetParam(), "--debug"},
+                                         sandbox_.folder())
+                                 .value();
+    ASSERT_EQ(built.exit_code, 0) << built.output;
+    start(program);
+    attach();
+  }
+  void write(const std::string& text) {
+    const ControlReply reply = process_->ask(ControlVerb::write_variable, text);
+    EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  }
+  bool comes_to(const std::string& place) {
+    return eventually([&] { return stack("Main") == place; });
+  }
+  std::string innermost() { return task("Main")["stack"][0].value("instance", ""); }
+};
+
+INSTANTIATE_TEST_SUITE_P(By, DebuggedText, ::testing::Values("matiec", "strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
+
+/// For programs that only that compiler translates.
+class DebuggedMethods : public DebuggedText {};
+INSTANTIATE_TEST_SUITE_P(By, DebuggedMethods, ::testing::Values("strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
+
+constexpr const char* kPress = R"(FUNCTION Twice : INT
+  VAR_INPUT x : INT; END_VAR
+  Twice := x * 2;
+END_FUNCTION
+
+FUNCTION_BLOCK Counter
+  VAR_INPUT up : BOOL; END_VAR
+  VAR_OUTPUT n : INT; END_VAR
+  IF up THEN
+    n := n + 1;
+  END_IF;
+END_FUNCTION_BLOCK
+
+PROGRAM Press
+  VAR one : Counter; two : Counter; total : INT; END_VAR
+  one(up := TRUE);
+  two(up := one.n > 5);
+  IF total > 1000 THEN
+    total := 0;
+  ELSE
+    total := Twice(two.n);
+  END_IF;
+END_PROGRAM
+
+CONFIGURATION cell
+  RESOURCE line ON PLC
+    TASK Main (INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM press1 WITH Main : Press;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(DebuggedText, HaltsByItsLines) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kPress));
+  command("break Press:16");
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  EXPECT_EQ(stack("Main"), "Press:16");
+  EXPECT_EQ(innermost(), "press1");
+  write("press1.one.n=100");
+  write("press1.two.n=200");
+  command("delete *");
+  const auto made = command("break press.st:8 if n > 150");
+  EXPECT_EQ(made.value("pou", ""), "Counter");
+  EXPECT_EQ(made.value("line", 0), 9);
+  EXPECT_EQ(made.value("remark", "x"), "");
+  command("continue Main");
+  // The names of a function block are those of the instance that comes there.
+  EXPECT_TRUE(comes_to("Counter:9 Press:17")) << state().dump(2);
+  EXPECT_EQ(innermost(), "press1.two");
+  EXPECT_EQ(values_->read("press1.one.n"), "101");
+  command("delete *");
+  command("until Main Twice:3");
+  EXPECT_TRUE(comes_to("Twice:3 Press:21")) << state().dump(2);
+  command("detach");
+  EXPECT_TRUE(goes_on("Main"));
+}
+
+TEST_P(DebuggedText, IsSteppedIntoOverAndOutOf) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kPress));
+  command("break Press:16");
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  command("delete *");
+  write("press1.one.n=7");
+  write("press1.total=3");
+  EXPECT_EQ(stack_after("step"), "Counter:9 Press:16");
+  EXPECT_EQ(stack_after("next"), "Counter:10 Press:16");
+  EXPECT_EQ(stack_after("out"), "Press:17");
+  EXPECT_EQ(values_->read("press1.one.n"), "8");
+  EXPECT_EQ(stack_after("next"), "Press:18");
+  EXPECT_EQ(stack_after("next"), "Press:21");
+  EXPECT_EQ(stack_after("step"), "Twice:3 Press:21");
+  EXPECT_EQ(stack_after("out"), "Press:16");
+  command("detach");
+  EXPECT_TRUE(goes_on("Main"));
+}
+
+constexpr const char* kLine = R"(FUNCTION_BLOCK Pump
+  VAR hours : INT; END_VAR
+  METHOD Reset : BOOL
+    VAR_INPUT value : INT; END_VAR
+    hours := value;
+    Reset := TRUE;
+  END_METHOD
+  hours := hours + 1;
+END_FUNCTION_BLOCK
+
+PROGRAM Line
+  VAR one, two : Pump; i : INT; cells : ARRAY[0..9] OF INT; place : INT; done : BOOL; END_VAR
+  FOR i := 1 TO 3 DO
+    one();
+  END_FOR;
+  CASE place OF
+    0:
+      cells[0] := 1;
+    1, 3..5:
+      done := two.Reset(value := 40);
+  ELSE
+    cells[place] := 2;
+  END_CASE;
+END_PROGRAM
+
+CONFIGURATION cell
+  RESOURCE line ON PLC
+    TASK Main (INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM line1 WITH Main : Line;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(DebuggedMethods, AreStatementsOfTheirBlock) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kLine));
+  EXPECT_EQ(command("break Pump:8 if line1.i = 2 AND hours > 1").value("remark", "x"), "");
+  EXPECT_TRUE(comes_to("Pump:8 Line:14")) << state().dump(2);
+  EXPECT_EQ(innermost(), "line1.one");
+  EXPECT_EQ(values_->read("line1.i"), "2");
+  command("delete *");
+  write("line1.place=4");
+  EXPECT_EQ(stack_after("out"), "Line:14");
+  EXPECT_EQ(values_->read("line1.i"), "3");
+  EXPECT_EQ(stack_after("next"), "Line:16");
+  EXPECT_EQ(stack_after("next"), "Line:20");
+  EXPECT_EQ(stack_after("step"), "Pump:5 Line:20");
+  EXPECT_EQ(innermost(), "line1.two");
+  EXPECT_EQ(stack_after("next"), "Pump:6 Line:20");
+  EXPECT_EQ(values_->read("line1.two.hours"), "40");
+  EXPECT_EQ(stack_after("out"), "Line:13");
+}
+
+// The library throws out of the frames.
+TEST_P(DebuggedMethods, EndInTheExceptionsOfTheirProgram) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kLine));
+  command("break Line:22");
+  write("line1.place=77");
+  EXPECT_TRUE(comes_to("Line:22")) << state().dump(2);
+  command("continue Main");
+  EXPECT_TRUE(eventually([&] { return process_->task("Main")->state == PageTaskState::exception; }))
+      << process_->log();
+  EXPECT_EQ(process_->ask(ControlVerb::status).code, ErrorCode::ok);
+  EXPECT_THAT(process_->log(), ::testing::HasSubstr("out of bounds"));
+}
+
+}  // namespace
+}  // namespace plchost::testing
