@@ -19,7 +19,7 @@ install(CODE "
   COMPONENT plchost)
 
 # For applications: their headers, and the flags that they are built with.
-install(FILES instances/plc_app.h instances/plc_app.hpp instances/plc_debug.h instances/plc_online_change.h instances/plc_variables.h instances/plc_variables.hpp
+install(FILES instances/plc_app.h instances/plc_app.hpp instances/plc_debug.h instances/plc_instance.h instances/plc_online_change.h instances/plc_variables.h instances/plc_variables.hpp
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/plchost COMPONENT plchost-dev)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/share/plchost/adapters DESTINATION ${CMAKE_INSTALL_DATADIR}/plchost COMPONENT plchost)
 install(FILES api/control.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/plchost COMPONENT plchost-dev)

@@ -179,31 +179,6 @@ RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
  */
 RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 
-/* Why the process of this application began. An application that keeps data of its own decides by it whether
- * to go on with them, as the runtime does. After PLC_START_COLD retain areas begin with initial values. Else
- * they, and persistent areas always, go on with their last values if the layout is the same. Any. */
-#define PLC_START_FIRST 0       /* by hand, first start by this manager, or another application was loaded */
-#define PLC_START_WARM 1        /* warm reset, or restart */
-#define PLC_START_COLD 2        /* cold reset: begin with initial values */
-#define PLC_START_AFTER_FAULT 3 /* the process before ended by itself (a crash) and is started again */
-int CDECL plc_start_kind(void);
-
-/* The name of the instance that runs this application: "line1". Valid until the process ends. Any. */
-const char* CDECL plc_instance_name(void);
-
-/* The text of "Parameter.pszName" in the section [Application] of the instance's settings: one program runs
- * in several instances, each with values of its own. Valid until the process ends. NULL: pszName is null, or
- * the parameter is not set; it may be set to an empty text. Compares names: in a cycle keep the text instead.
- * Any. */
-const char* CDECL plc_parameter(const char* pszName);
-
-/* The scheduler that the application is made for: "CmpSchedule", "CmpScheduleTimer" or "CmpScheduleOneShot".
- * It is used by a fresh process if nothing else names one: the configuration of the host, `plcctl set
- * scheduler`, or TimerMode=OneShot in the settings. An online change does not use it. From plc_app_init only.
- * ERR_OK; ERR_PARAMETER: null, or no scheduler of that name (the log names them); ERR_DUPLICATE: named
- * already; ERR_NOTINITIALIZED. Control. */
-RTS_RESULT CDECL plc_prefer_scheduler(const char* pszScheduler);
-
 /* ---- Memory areas -------------------------------------------------------------------------------------- */
 
 /*
@@ -290,7 +265,8 @@ typedef struct {
 /* ERR_OK; ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED: not placed yet. Any. */
 RTS_RESULT CDECL plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState);
 
-/* ---- Online change, variables that are seen from outside ----------------------------------------------- */
+/* ---- The instance, online change, variables that are seen from outside --------------------------------- */
+#include "plc_instance.h"
 #include "plc_online_change.h"
 #include "plc_variables.h"
 

@@ -42,6 +42,9 @@ void __sys__setup__tasks(sys_setup_tasks_struct* given) {
 RTS_RESULT plc_set_task_options(const char* task, const Task_Options* options) {
   return task != NULL && options != NULL ? ERR_OK : ERR_PARAMETER;
 }
+RTS_RESULT plc_prefer_scheduler(const char* name) {
+  return name != NULL ? ERR_OK : ERR_PARAMETER;
+}
 Task_Info* plc_current_task(void) {
   return current;
 }

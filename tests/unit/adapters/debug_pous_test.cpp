@@ -25,7 +25,8 @@ TEST(DebugPous, AreDeclaredWithTheirInstances) {
 // A program may have them as names of its own.
 TEST(DebugPous, LeaveNoMacroOfTheHeadersBehind) {
   const std::string header = debug_header({});
-  for (const char* const name : {"plc_app.h", "plc_variables.h", "plc_online_change.h", "plc_debug.h"}) {
+  for (const char* const name :
+       {"plc_app.h", "plc_instance.h", "plc_variables.h", "plc_online_change.h", "plc_debug.h"}) {
     std::ifstream file(std::string(EXAMPLES) + "/../" + name);
     ASSERT_TRUE(file) << name;
     for (std::string line; std::getline(file, line);) {
