@@ -87,7 +87,7 @@ TEST(ModbusProcess, AKilledProcessLeavesAnImageThatTheNextTakesOver) {
 }
 
 // Words of an image that is opened anew.
-testing::AssertionResult first_word_becomes(const Plant& plant, const char* name, std::uint16_t wanted) {
+::testing::AssertionResult first_word_becomes(const Plant& plant, const char* name, std::uint16_t wanted) {
   plc_image image{};
   std::array<std::uint16_t, Plant::kSize / 2> words{};
   const bool opened = eventually(
@@ -97,7 +97,7 @@ testing::AssertionResult first_word_becomes(const Plant& plant, const char* name
         return plc_image_read(&image, words.data(), nullptr) == PLC_IMAGE_OK && words[0] == wanted;
       });
   plc_image_close(&image);
-  return came ? testing::AssertionSuccess() : testing::AssertionFailure() << "it is " << words[0];
+  return came ? ::testing::AssertionSuccess() : ::testing::AssertionFailure() << "it is " << words[0];
 }
 
 // The files of a host that has ended are not made again by firmware.
