@@ -104,7 +104,7 @@ TEST_P(SafeOutputsUnderAManager, AreMadeSafeByAManagerWhoseConfigurationHasLostT
   plant.clear_instances();
   plant.start_manager();
   expect_ended();
-  EXPECT_FALSE(std::filesystem::exists(page()));
+  EXPECT_TRUE(Plant::eventually([&] { return !std::filesystem::exists(page()); })) << "it goes behind them";
 }
 
 TEST_P(SafeOutputsUnderAManager, StayDrivenWhileOnlyTheManagerIsKilled) {

@@ -291,6 +291,34 @@ TEST_P(InstanceWishes, AreOnTheDiskBeforeACommandIsAnswered) {
   EXPECT_EQ(reply.text, "line1: stopped; a power cut would undo it: disk full");
 }
 
+// A debugger reads its answer, and no disk knows of forces.
+TEST_P(InstanceWishes, AreNotWaitedForByCommandsThatTheProcessCarriesOut) {
+  bring_up();
+  wishes_.disk_is_slow = true;
+  wishes_.problem = "disk full";
+  ask(ControlVerb::debug, "attach");
+  answer(ErrorCode::ok, R"({"session":1})");
+  EXPECT_EQ(take_reply().text, R"({"session":1})");
+  ask(ControlVerb::force_variable, "speed=1");
+  answer(ErrorCode::ok, "'speed' is forced");
+  EXPECT_EQ(take_reply().text, "'speed' is forced");
+  ask(ControlVerb::stop);
+  answer(ErrorCode::ok, "1 halted tasks were let go first");
+  ASSERT_EQ(wishes_.waiting.size(), 1U);
+  wishes_.waiting.front()("");
+  EXPECT_EQ(take_reply().text, "line1: stopped; 1 halted tasks were let go first");
+}
+
+TEST_P(InstanceWishes, TellOfForcesThatEndedWhileNoManagerRan) {
+  if (GetParam() == Death::power_cut) return;
+  bring_up();
+  end_manager();
+  host_.page = InstanceRuntime{};
+  host_.page->forces = 2;
+  begin_next_manager();
+  EXPECT_THAT(problem(), HasSubstr("ended while no manager ran; 2 forces ended"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Deaths, InstanceWishes, testing::Values(Death::manager_killed, Death::power_cut),
                          [](const auto& death) {
                            return death.param == Death::power_cut ? "PowerCut" : "ManagerKilled";
