@@ -28,7 +28,7 @@ Result<std::string> part_in(const Json& wanted, const char* key) {
   const auto found = wanted.find(key);
   if (found == wanted.end() || found->is_null()) return std::string();
   if (!found->is_string()) return failure(ErrorCode::invalid_argument, fmt::format("{} is no text", key));
-  const auto text = found->get<std::string>();
+  auto text = found->get<std::string>();
   if (!is_printable_utf8(text))
     return failure(ErrorCode::invalid_argument, fmt::format("{} has characters that cannot be printed", key));
   return text;
@@ -75,11 +75,12 @@ bool DapSession::obey(const Json& request) {
   const auto found = request.find("arguments");
   const Json arguments = found != request.end() && found->is_object() ? *found : Json::object();
   Answer answer = carry_out(command, arguments);
+  const bool done = answer.has_value();
   Json response{{"type", "response"},
                 {"request_seq", number_in(request, "seq")},
-                {"success", answer.has_value()},
+                {"success", done},
                 {"command", command}};
-  if (answer) {
+  if (done) {
     response["body"] = *std::move(answer);
   } else {
     response["message"] = answer.error().describe();
@@ -91,7 +92,7 @@ bool DapSession::obey(const Json& request) {
   }
   response["seq"] = sequence_++;
   send_(response);
-  if (command == "attach" && answer) event("initialized", Json::object());
+  if (command == "attach" && done) event("initialized", Json::object());
   return command != "disconnect" && command != "terminate";
 }
 
@@ -118,7 +119,7 @@ DapSession::Answer DapSession::carry_out(const std::string& command, const Json&
   if (!link_.attached())
     return failure(ErrorCode::wrong_state, "not attached: the request 'attach' comes first");
   using Do = Answer (DapSession::*)(const Json&);
-  static const std::map<std::string, Do> kOwn = {
+  static const std::map<std::string, Do> own_requests = {
       {"setBreakpoints", &DapSession::set_breakpoints},
       {"setFunctionBreakpoints", &DapSession::set_function_breakpoints},
       {"stackTrace", &DapSession::stack},
@@ -127,7 +128,8 @@ DapSession::Answer DapSession::carry_out(const std::string& command, const Json&
       {"setVariable", &DapSession::set_variable},
       {"evaluate", &DapSession::evaluate},
       {"pause", &DapSession::pause}};
-  if (const auto own = kOwn.find(command); own != kOwn.end()) return (this->*own->second)(arguments);
+  if (const auto own = own_requests.find(command); own != own_requests.end())
+    return (this->*own->second)(arguments);
   if (command == "threads") return threads();
   if (command == "configurationDone" || command == "setExceptionBreakpoints") return Json::object();
   if (command == "continue" || command == "next" || command == "stepIn" || command == "stepOut")
@@ -222,10 +224,10 @@ DapSession::Answer DapSession::stack(const Json& arguments) {
 }
 
 DapSession::Answer DapSession::go_on(const std::string& command, const Json& arguments) {
-  static const std::map<std::string, std::string> kWords = {
+  static const std::map<std::string, std::string> words = {
       {"continue", "continue"}, {"next", "next"}, {"stepIn", "step"}, {"stepOut", "out"}};
   PLCHOST_TRY_ASSIGN(const auto task, task_of(arguments));
-  PLCHOST_TRY(link_.command(fmt::format("{} {}", kWords.at(command), task)));
+  PLCHOST_TRY(link_.command(fmt::format("{} {}", words.at(command), task)));
   if (command == "continue") return Json{{"allThreadsContinued", false}};
   return Json::object();
 }

@@ -79,7 +79,7 @@ DapSession::Answer DapSession::set_variable(const Json& arguments) {
 
 // A name, or in the debug console "NAME := VALUE".
 DapSession::Answer DapSession::evaluate(const Json& arguments) {
-  std::string expression = text_in(arguments, "expression");
+  const std::string expression = text_in(arguments, "expression");
   const std::string instance = instance_of(number_in(arguments, "frameId"));
   const auto trim = [](std::string text) {
     const auto first = text.find_first_not_of(' ');

@@ -82,7 +82,7 @@ bool DebugConsole::obey(std::string_view line) {
 
 Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& rest) {
   using Do = std::function<Result<void>(DebugConsole&, const std::string&)>;
-  static const std::map<std::string_view, Do, std::less<>> kOwn = {
+  static const std::map<std::string_view, Do, std::less<>> own_commands = {
       {"break", &DebugConsole::add_breakpoint},
       {"list", [](auto& self, const auto&) { return self.list(); }},
       {"tasks", [](auto& self, const auto&) { return self.tasks(); }},
@@ -95,7 +95,7 @@ Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& r
          fmt::print("{}\n", fmt::join(kCommands, "\n"));
          return Result<void>();
        }}};
-  if (const auto own = kOwn.find(verb); own != kOwn.end()) return own->second(*this, rest);
+  if (const auto own = own_commands.find(verb); own != own_commands.end()) return own->second(*this, rest);
   static constexpr std::array kSteps = {"continue", "pause", "step", "next", "out", "until"};
   if (std::ranges::find(kSteps, verb) != kSteps.end()) return go_on(verb, rest);
   if (verb == "delete" || verb == "halts") {
