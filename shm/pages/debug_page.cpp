@@ -29,7 +29,7 @@ static_assert(offsetof(DebugPageLayout, version) == 8 && sizeof(DebugState) == 6
 std::optional<DebugPart> DebugPart::parse(std::string_view text) noexcept {
   DebugPart part;
   const char* const last = text.data() + text.size();
-  const auto session = std::from_chars(text.data(), last, part.session);
+  const auto session = std::from_chars(text.data(), text.data() + text.size(), part.session);
   if (session.ec != std::errc{} || session.ptr == last || *session.ptr != ' ') return std::nullopt;
   const auto offset = std::from_chars(session.ptr + 1, last, part.offset);
   if (offset.ec != std::errc{} || offset.ptr != last) return std::nullopt;
