@@ -211,10 +211,11 @@ void add_variable_verbs(const Command& plcctl, CliSession& session) {
       .argument("INSTANCE", arguments->instance)
       .arguments("VARIABLE", arguments->names, kVariableNames);
   add_command(plcctl, session, ControlVerb::write_variable, "write", "Write variables of an application",
-              "VARIABLE=VALUE", "a value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
+              "ASSIGNMENT",
+              "VARIABLE=VALUE, the value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
   add_command(plcctl, session, ControlVerb::force_variable, "force",
-              "Force variables: each has its value at the begin and end of each cycle", "VARIABLE=VALUE",
-              "a value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
+              "Force variables: each has its value at the begin and end of each cycle", "ASSIGNMENT",
+              "VARIABLE=VALUE, the value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
   const auto unforced = std::make_shared<UnforceArguments>();
   plcctl.verb("unforce", "End the forcing of variables, which keep the values that they have")
       .noun("variable", "End the forcing of variables, which keep the values that they have",
