@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -14,9 +15,8 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r\n";
 
-std::string_view trimmed(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+std::string_view trim(std::string_view text) {
+  return trimmed(text, kBlanks);
 }
 
 std::string lower_case(std::string_view text) {
@@ -65,7 +65,7 @@ std::string advice_for_quoted(std::string_view key, std::string_view value) {
     return fmt::format("'\\' begins a special character; put the text in single quotes: {} = '{}'", key,
                        shown(text));
   }
-  const std::string_view behind = trimmed(value.substr(end + 1));
+  const std::string_view behind = trim(value.substr(end + 1));
   if (behind.empty() || behind.starts_with('#')) return "";
   return fmt::format("'{}' stands behind the value of {}; remove it or begin a new line", shown(behind), key);
 }
@@ -79,8 +79,8 @@ std::string advice_for(std::string_view line) {
   if (equals == std::string_view::npos) {
     return fmt::format("'{}' has no '='; a line is KEY = VALUE or [SECTION]", shown(line));
   }
-  const std::string key = shown(trimmed(line.substr(0, equals)));
-  const std::string_view value = trimmed(line.substr(equals + 1));
+  const std::string key = shown(trim(line.substr(0, equals)));
+  const std::string_view value = trim(line.substr(equals + 1));
   if (value.empty() || value.starts_with('#')) return fmt::format("the value of {} is missing", key);
   if (value.starts_with('"')) return advice_for_quoted(key, value);
   if (value.starts_with('[')) {
@@ -90,7 +90,7 @@ std::string advice_for(std::string_view line) {
         key);
   }
   if (value.starts_with('\'') || value.starts_with('{')) return "";
-  return advice_for_word(key, trimmed(value.substr(0, value.find('#'))));
+  return advice_for_word(key, trim(value.substr(0, value.find('#'))));
 }
 
 }  // namespace
@@ -98,10 +98,10 @@ std::string advice_for(std::string_view line) {
 std::string toml_advice(std::string_view line, std::string_view parsers_words) {
   const bool twice = parsers_words.contains("cannot redefine");
   if (twice) {
-    const std::string key = shown(trimmed(line.substr(0, line.find('='))));
+    const std::string key = shown(trim(line.substr(0, line.find('='))));
     return fmt::format("{} is given twice; remove one of them", key);
   }
-  if (std::string advice = advice_for(trimmed(line)); !advice.empty()) return advice;
+  if (std::string advice = advice_for(trim(line)); !advice.empty()) return advice;
   return printable(std::string(parsers_words));
 }
 

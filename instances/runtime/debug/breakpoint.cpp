@@ -1,13 +1,14 @@
 #include "instances/runtime/debug/breakpoint.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "instances/runtime/debug/debug_words.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -17,12 +18,6 @@ constexpr std::size_t kMaxLogText = 200;
 
 std::unexpected<Error> bad_order(std::string text) {
   return failure(ErrorCode::invalid_argument, std::move(text));
-}
-
-std::string_view trimmed(std::string_view text) noexcept {
-  const std::size_t first = text.find_first_not_of(' ');
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(' ') - first + 1);
 }
 
 }  // namespace
@@ -35,9 +30,8 @@ Result<HitRule> HitRule::parse(std::string_view text) {
     rule.kind = text.front() == '=' ? Kind::equal : Kind::multiple;
     digits.remove_prefix(1);
   }
-  digits = trimmed(digits);
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), rule.count);
-  if (error == std::errc{} && end == digits.data() + digits.size() && rule.count > 0) return rule;
+  rule.count = number_in<std::uint64_t>(trimmed(digits)).value_or(0);
+  if (rule.count > 0) return rule;
   return bad_order(fmt::format(
       "'{}' is no count of hits: =N (the N-th), %N (each N-th) and >=N (from the N-th on) are", shown(text)));
 }

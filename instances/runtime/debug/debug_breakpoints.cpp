@@ -56,8 +56,9 @@ Result<std::optional<ValuePlace>> DebugService::find_own_value(std::uint32_t pou
     addresses.push_back(own->address);
   }
   if (!own) return std::nullopt;
-  if (addresses.size() == instances.size()) own = place_in_each(*own, selves, addresses);
-  if (own && addresses.size() == instances.size()) return own;
+  if (addresses.size() == instances.size()) {
+    if (const auto place = place_in_each(*own, selves, addresses)) return place;
+  }
   return failure(
       ErrorCode::unsupported,
       fmt::format("'{}' of {} lies apart from its instances: name that of one of them, as '{}.{}'",

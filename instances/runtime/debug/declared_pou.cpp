@@ -1,12 +1,12 @@
 #include "instances/runtime/debug/declared_pou.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <limits>
 
 #include <fmt/format.h>
 
+#include "instances/runtime/debug/debug_words.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 #include "shm/variables/variable_symbol.hpp"
@@ -111,9 +111,8 @@ Result<PouLine> PouCollection::find(std::string_view place) const {
   const std::size_t colon = place.find_last_of(':');
   std::uint32_t line = 0;
   if (colon != std::string_view::npos) {
-    const auto digits = place.substr(colon + 1);
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), line);
-    if (error != std::errc{} || end != digits.data() + digits.size() || line == 0) {
+    line = number_in<std::uint32_t>(place.substr(colon + 1)).value_or(0);
+    if (line == 0) {
       return failure(ErrorCode::invalid_argument,
                      fmt::format("'{}' is no place: POU, POU:LINE or FILE:LINE is", shown(place)));
     }

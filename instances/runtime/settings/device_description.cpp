@@ -9,6 +9,7 @@
 #include <pugixml.hpp>
 
 #include "shm/base/names.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -49,12 +50,7 @@ xml_node child_called(const xml_node& parent, std::string_view name, std::string
   return {};
 }
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n";
-  const std::size_t begin = text.find_first_not_of(kBlank);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
-}
+constexpr std::string_view kXmlBlanks = " \t\r\n";
 
 // All texts and CDATA sections of it: an editor may have split them.
 std::string text_in(const xml_node& node) {
@@ -76,7 +72,7 @@ Result<std::vector<std::string>> events_below(const xml_node& events, const Plac
     }
     const xml_node name = child_called(event, "name");
     if (!name) return place.wrong(offset, "externalevents: an externalevent without a name");
-    const std::string text(trimmed(text_in(name)));
+    const std::string text(trimmed(text_in(name), kXmlBlanks));
     if (auto valid = check_name("externalevents: name", text, kMaxEventName); !valid) {
       return place.wrong(offset, valid.error().message);
     }
@@ -103,7 +99,7 @@ Result<std::vector<std::string>> events_of(const xml_node& value, const Place& p
                                    shown(local_name(other))));
   }
   const std::string inner = text_in(value);
-  if (trimmed(inner).empty()) return std::vector<std::string>();
+  if (trimmed(inner, kXmlBlanks).empty()) return std::vector<std::string>();
   pugi::xml_document document;
   const auto parsed = document.load_buffer(inner.data(), inner.size(), kParse, pugi::encoding_utf8);
   if (!parsed) {
@@ -117,7 +113,7 @@ Result<std::vector<std::string>> events_of(const xml_node& value, const Place& p
 Result<bool> supports_external(const xml_node& setting, const Place& place) {
   if (!setting) return false;
   const std::string text = text_in(child_called(setting, "value"));
-  const std::string_view value = trimmed(text);
+  const std::string_view value = trimmed(text, kXmlBlanks);
   if (value == "1" || value == "0") return value == "1";
   return place.wrong(setting.offset_debug(),
                      fmt::format("supportexternal: '{}' is not allowed: 0 and 1 are", shown(value)));

@@ -6,6 +6,7 @@
 #include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/trimmed.hpp"
 #include "shm/block_driver/block.hpp"
 #include "shm/block_driver/node_directory.hpp"
 
@@ -46,10 +47,7 @@ std::vector<std::string> words_of(std::string_view text) {
   std::vector<std::string> words;
   while (!text.empty()) {
     const std::size_t comma = std::min(text.find(','), text.size());
-    std::string_view word = text.substr(0, comma);
-    while (word.starts_with(' ')) word.remove_prefix(1);
-    while (word.ends_with(' ')) word.remove_suffix(1);
-    words.emplace_back(word);
+    words.emplace_back(trimmed(text.substr(0, comma)));
     text.remove_prefix(std::min(comma + 1, text.size()));
   }
   return words;

@@ -8,6 +8,7 @@
 
 #include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -16,8 +17,7 @@ namespace {
 constexpr std::string_view kBlank = " \t\v\f";
 
 std::string_view trim(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(kBlank), text.size()));
-  return text.substr(0, text.find_last_not_of(kBlank) + 1);
+  return trimmed(text, kBlank);
 }
 
 bool is_comment(std::string_view text) {
