@@ -70,6 +70,10 @@ void DapSession::event(const std::string& name, Json body) {
   send_({{"seq", sequence_++}, {"type", "event"}, {"event", name}, {"body", std::move(body)}});
 }
 
+void DapSession::tell(const std::string& category, const std::string& text) {
+  event("output", {{"category", category}, {"output", text + "\n"}});
+}
+
 bool DapSession::obey(const Json& request) {
   const std::string command = text_in(request, "command");
   const auto found = request.find("arguments");
@@ -147,7 +151,7 @@ DapSession::Answer DapSession::attach(const Json& arguments) {
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   tasks_.clear();
   for (const Json& task : state_.value("tasks", Json::array())) tasks_.push_back(task.value("task", ""));
-  if (!remark.empty()) event("output", {{"category", "important"}, {"output", remark + "\n"}});
+  if (!remark.empty()) tell("important", remark);
   return Json::object();
 }
 
@@ -162,8 +166,7 @@ Json DapSession::set_one(const std::string& key, const std::string& place, const
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
   ids_[key].push_back(id);
-  if (const auto remark = answer->value("remark", ""); !remark.empty())
-    event("output", {{"category", "important"}, {"output", remark + "\n"}});
+  if (const auto remark = answer->value("remark", ""); !remark.empty()) tell("important", remark);
   return {{"verified", true}, {"id", id}, {"line", answer->value("line", 0)}};
 }
 
@@ -208,16 +211,14 @@ DapSession::Answer DapSession::stack(const Json& arguments) {
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   const std::int64_t thread = number_in(arguments, "threadId");
   Json frames = Json::array();
-  for (const Json& task : state_.value("tasks", Json::array())) {
-    if (task.value("task", "") != name) continue;
-    for (const Json& frame : task.value("stack", Json::array())) {
-      const std::string file = frame.value("file", "");
-      frames.push_back({{"id", thread * kFramesOfThread + static_cast<std::int64_t>(frames.size())},
-                        {"name", frame.value("pou", "")},
-                        {"line", frame.value("line", 0)},
-                        {"column", 1},
-                        {"source", {{"name", last_name(file)}, {"path", file}}}});
-    }
+  const Json* const task = task_in(state_, name);
+  for (const Json& frame : task == nullptr ? Json::array() : task->value("stack", Json::array())) {
+    const std::string file = frame.value("file", "");
+    frames.push_back({{"id", thread * kFramesOfThread + static_cast<std::int64_t>(frames.size())},
+                      {"name", frame.value("pou", "")},
+                      {"line", frame.value("line", 0)},
+                      {"column", 1},
+                      {"source", {{"name", last_name(file)}, {"path", file}}}});
   }
   const std::size_t total = frames.size();
   return Json{{"stackFrames", std::move(frames)}, {"totalFrames", total}};
@@ -238,31 +239,18 @@ DapSession::Answer DapSession::pause(const Json& arguments) {
   return Json::object();
 }
 
-void DapSession::tell_halts(const Json& state) {
-  for (const Json& task : state.value("tasks", Json::array())) {
-    if (task.value("state", "") != "halted") continue;
-    const std::string name = task.value("task", "");
-    const auto halt = task.value("halt", std::uint64_t{0});
-    if (std::exchange(told_[name], halt) == halt) continue;
-    const auto thread = std::ranges::find(tasks_, name) - tasks_.begin() + 1;
-    Json body{{"reason", task.value("reason", "")}, {"threadId", thread}, {"allThreadsStopped", false}};
-    if (task.contains("breakpoint")) body["hitBreakpointIds"] = Json::array({task["breakpoint"]});
-    event("stopped", std::move(body));
-  }
+void DapSession::tell_halt(const Json& task) {
+  const auto thread = std::ranges::find(tasks_, task.value("task", "")) - tasks_.begin() + 1;
+  Json body{{"reason", task.value("reason", "")}, {"threadId", thread}, {"allThreadsStopped", false}};
+  if (task.contains("breakpoint")) body["hitBreakpointIds"] = Json::array({task["breakpoint"]});
+  event("stopped", std::move(body));
 }
 
 Result<void> DapSession::look() {
   if (!link_.attached()) return {};
   PLCHOST_TRY_ASSIGN(state_, link_.state());
-  for (const Json& line : state_.value("log", Json::array())) {
-    const auto number = line.value("number", std::uint64_t{0});
-    if (number <= logged_) continue;
-    if (const std::string gap = log_gap(logged_, number); !gap.empty())
-      event("output", {{"category", "important"}, {"output", gap + "\n"}});
-    logged_ = number;
-    event("output", {{"category", "console"}, {"output", line.value("text", "") + "\n"}});
-  }
-  tell_halts(state_);
+  for (const auto& line : news_.lines(state_)) tell(line.is_gap ? "important" : "console", line.text);
+  for (const Json& task : news_.halts(state_)) tell_halt(task);
   return {};
 }
 

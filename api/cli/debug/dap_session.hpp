@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/cli/debug/debug_link.hpp"
+#include "api/cli/debug/debug_state.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -56,16 +57,16 @@ class DapSession {
   [[nodiscard]] Result<std::string> task_of(const Json& arguments);
   [[nodiscard]] std::string instance_of(std::int64_t frame) const;
   void event(const std::string& name, Json body);
-  void tell_halts(const Json& state);
+  void tell(const std::string& category, const std::string& text);
+  void tell_halt(const Json& task);
 
   DebugLink& link_;
   std::function<void(const Json&)> send_;
   bool take_;
   std::int64_t sequence_ = 1;
   Json state_;
-  std::vector<std::string> tasks_;             // thread 1 is the first
-  std::map<std::string, std::uint64_t> told_;  // number of the last halt of each task
-  std::uint64_t logged_ = 0;
+  std::vector<std::string> tasks_;  // thread 1 is the first
+  DebugNews news_;
   std::map<std::string, std::vector<std::uint32_t>> ids_;  // breakpoints by source, or "" of functions
 };
 

@@ -4,6 +4,7 @@
 #include "api/cli/debug/dap_session.hpp"
 #include "api/cli/debug/foreign_json.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -28,12 +29,9 @@ std::string DapSession::instance_of(std::int64_t frame) const {
   const auto thread = static_cast<std::size_t>(frame / kFramesOfThread);
   const auto place = static_cast<std::size_t>(frame % kFramesOfThread);
   if (frame <= 0 || thread < 1 || thread > tasks_.size()) return {};
-  for (const Json& task : state_.value("tasks", Json::array())) {
-    if (task.value("task", "") != tasks_[thread - 1]) continue;
-    const Json stack = task.value("stack", Json::array());
-    return place < stack.size() ? stack[place].value("instance", "") : std::string();
-  }
-  return {};
+  const Json* const task = task_in(state_, tasks_[thread - 1]);
+  const Json stack = task == nullptr ? Json::array() : task->value("stack", Json::array());
+  return place < stack.size() ? stack[place].value("instance", "") : std::string();
 }
 
 // The variables of a frame have its number.
@@ -65,9 +63,7 @@ DapSession::Answer DapSession::variables(const Json& arguments) {
 
 DapSession::Answer DapSession::written(const std::string& instance, const std::string& name,
                                        const std::string& value) {
-  PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(instance, name));
-  const std::string whole(dds::text_of(variable.name));
-  PLCHOST_TRY(link_.write(fmt::format("{}={}", whole, value)));
+  PLCHOST_TRY_ASSIGN(const auto whole, link_.write(instance, name, value));
   PLCHOST_TRY_ASSIGN(const auto now, link_.variable("", whole));
   return variable_json(now, "");
 }
@@ -81,11 +77,7 @@ DapSession::Answer DapSession::set_variable(const Json& arguments) {
 DapSession::Answer DapSession::evaluate(const Json& arguments) {
   const std::string expression = text_in(arguments, "expression");
   const std::string instance = instance_of(number_in(arguments, "frameId"));
-  const auto trim = [](std::string text) {
-    const auto first = text.find_first_not_of(' ');
-    if (first == std::string::npos) return std::string();
-    return text.substr(first, text.find_last_not_of(' ') - first + 1);
-  };
+  const auto trim = [](std::string_view text) { return std::string(trimmed(text)); };
   const std::size_t assign = expression.find(":=");
   Answer made = Json();
   if (assign != std::string::npos && text_in(arguments, "context") == "repl") {

@@ -38,14 +38,6 @@ std::string place_text(const Json& frame) {
                      frame.contains("instance") ? "  " + frame.value("instance", "") : std::string());
 }
 
-const Json* task_in(const Json& state, std::string_view name) {
-  if (!state.contains("tasks")) return nullptr;
-  const Json& tasks = state["tasks"];
-  const auto found =
-      std::ranges::find_if(tasks, [&](const Json& task) { return task.value("task", "") == name; });
-  return found == tasks.end() ? nullptr : &*found;
-}
-
 void print_line(std::string_view text) {
   fmt::print("{}\n", printable(std::string(text)));
   std::fflush(stdout);
@@ -212,9 +204,7 @@ Result<void> DebugConsole::set(const std::string& order) {
   while (!name.empty() && name.back() == ' ') name.pop_back();
   std::size_t begin = equal + 1;
   while (begin < order.size() && order[begin] == ' ') ++begin;
-  PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(frame_instance(), name));
-  name = dds::text_of(variable.name);
-  PLCHOST_TRY(link_.write(fmt::format("{}={}", name, order.substr(begin))));
+  PLCHOST_TRY_ASSIGN(name, link_.write(frame_instance(), name, order.substr(begin)));
   return print(name);
 }
 
@@ -248,10 +238,10 @@ Result<void> DebugConsole::wait(const std::string& seconds) {
 // The halts that were told before do not count. A task that is named is let go before this.
 Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patience) {
   const TimePoint end = MonotonicClock::now() + patience;
-  const auto before = told_;
+  const auto before = news_.told();
   for (;;) {
     PLCHOST_TRY(look());
-    const bool halted = std::ranges::any_of(told_, [&](const auto& entry) {
+    const bool halted = std::ranges::any_of(news_.told(), [&](const auto& entry) {
       const auto known = before.find(entry.first);
       return (task.empty() || task == entry.first) &&
              (known == before.end() || known->second != entry.second);
@@ -269,19 +259,9 @@ Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patie
 
 void DebugConsole::take(const Json& state) {
   state_ = state;
-  for (const Json& line : state.value("log", Json::array())) {
-    const auto number = line.value("number", std::uint64_t{0});
-    if (number <= logged_) continue;
-    if (const std::string gap = log_gap(logged_, number); !gap.empty()) print_line(gap);
-    logged_ = number;
-    print_line("log: " + line.value("text", ""));
-  }
-  for (const Json& task : state.value("tasks", Json::array())) {
-    if (task.value("state", "") != "halted") continue;
-    const std::string name = task.value("task", "");
-    const auto halt = task.value("halt", std::uint64_t{0});
-    if (std::exchange(told_[name], halt) == halt) continue;
-    task_ = name;
+  for (const auto& line : news_.lines(state)) print_line(line.is_gap ? line.text : "log: " + line.text);
+  for (const Json& task : news_.halts(state)) {
+    task_ = task.value("task", "");
     print_halt(task);
   }
 }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/cli/debug/debug_link.hpp"
+#include "api/cli/debug/debug_state.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -45,9 +46,8 @@ class DebugConsole {
 
   DebugLink& link_;
   nlohmann::json state_;
-  std::string task_;                           // that halted last, or was named
-  std::map<std::string, std::uint64_t> told_;  // number of the last halt of each task
-  std::uint64_t logged_ = 0;
+  std::string task_;  // that halted last, or was named
+  DebugNews news_;
   bool failed_ = false;
 };
 

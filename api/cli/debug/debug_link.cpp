@@ -129,10 +129,13 @@ Result<plc_VariableRecord> DebugLink::variable(const std::string& instance, cons
                                                    instance.empty() ? instance_ : instance));
 }
 
-Result<void> DebugLink::write(const std::string& order) {
-  const auto done = call(static_cast<std::int32_t>(ControlVerb::write_variable), order);
-  if (!done) return std::unexpected(done.error());
-  return {};
+Result<std::string> DebugLink::write(const std::string& instance, const std::string& name,
+                                     const std::string& value) {
+  PLCHOST_TRY_ASSIGN(const auto found, variable(instance, name));
+  std::string whole(dds::text_of(found.name));
+  PLCHOST_TRY(
+      call(static_cast<std::int32_t>(ControlVerb::write_variable), fmt::format("{}={}", whole, value)));
+  return whole;
 }
 
 }  // namespace plchost

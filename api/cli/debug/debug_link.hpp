@@ -38,8 +38,9 @@ class DebugLink {
   /// The variable that a name means in a frame of `instance` (its path; empty: none): one of its own, else
   /// one by its whole name. not_found: there is none.
   [[nodiscard]] Result<plc_VariableRecord> variable(const std::string& instance, const std::string& name);
-  /// "NAME=VALUE" of a variable by its whole name.
-  [[nodiscard]] Result<void> write(const std::string& order);
+  /// Writes the variable that a name means in a frame of `instance`; its whole name.
+  [[nodiscard]] Result<std::string> write(const std::string& instance, const std::string& name,
+                                          const std::string& value);
 
  private:
   [[nodiscard]] Result<std::string> call(std::int32_t operation, const std::string& argument);

@@ -1,7 +1,5 @@
 #include "api/cli/debug/foreign_json.hpp"
 
-#include <fmt/format.h>
-
 namespace plchost {
 
 namespace {
@@ -41,12 +39,6 @@ std::int64_t number_in(const nlohmann::json& arguments, const char* key) {
 std::string text_in(const nlohmann::json& arguments, const char* key) {
   const auto found = arguments.find(key);
   return found != arguments.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-std::string log_gap(std::uint64_t last, std::uint64_t number) {
-  if (last == 0 || number == last + 1) return {};
-  return fmt::format("{} lines of log points came too fast: they are in the log of the instance only",
-                     number - last - 1);
 }
 
 }  // namespace plchost

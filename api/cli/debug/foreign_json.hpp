@@ -19,8 +19,4 @@ inline constexpr int kMaxJsonDepth = 32;
 [[nodiscard]] std::int64_t number_in(const nlohmann::json& arguments, const char* key);
 [[nodiscard]] std::string text_in(const nlohmann::json& arguments, const char* key);
 
-/// Between two lines of log points that were shown one after the other; empty: none is missing. `last` 0: the
-/// first line.
-[[nodiscard]] std::string log_gap(std::uint64_t last, std::uint64_t number);
-
 }  // namespace plchost

@@ -1,0 +1,51 @@
+#include "api/cli/debug/debug_state.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+}  // namespace
+
+const Json* task_in(const Json& state, std::string_view name) {
+  if (!state.contains("tasks")) return nullptr;
+  const Json& tasks = state["tasks"];
+  const auto found =
+      std::ranges::find_if(tasks, [&](const Json& task) { return task.value("task", "") == name; });
+  return found == tasks.end() ? nullptr : &*found;
+}
+
+std::vector<DebugNews::Line> DebugNews::lines(const Json& state) {
+  std::vector<Line> fresh;
+  for (const Json& line : state.value("log", Json::array())) {
+    const auto number = line.value("number", std::uint64_t{0});
+    if (number <= logged_) continue;
+    if (logged_ != 0 && number != logged_ + 1) {
+      fresh.push_back({.text = fmt::format("{} lines of log points came too fast: they are in the log of the "
+                                           "instance only",
+                                           number - logged_ - 1),
+                       .is_gap = true});
+    }
+    logged_ = number;
+    fresh.push_back({.text = line.value("text", "")});
+  }
+  return fresh;
+}
+
+std::vector<Json> DebugNews::halts(const Json& state) {
+  std::vector<Json> fresh;
+  for (const Json& task : state.value("tasks", Json::array())) {
+    if (task.value("state", "") != "halted") continue;
+    const auto halt = task.value("halt", std::uint64_t{0});
+    if (std::exchange(told_[task.value("task", "")], halt) != halt) fresh.push_back(task);
+  }
+  return fresh;
+}
+
+}  // namespace plchost
