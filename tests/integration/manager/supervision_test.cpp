@@ -62,7 +62,7 @@ TEST(CostsCycles, OfAnInstanceThatIsHeldUp) {
   const int pid = plant.status("drive1").pid;
   const auto hold_up = [&](std::uint32_t) {
     ASSERT_EQ(::kill(pid, SIGSTOP), 0);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
     ASSERT_EQ(::kill(pid, SIGCONT), 0);
   };
   std::vector<std::string> said;
