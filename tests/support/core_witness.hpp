@@ -17,21 +17,22 @@ namespace plchost {
 /// meanwhile are no fault of plchost.
 class CoreWitness {
  public:
-  explicit CoreWitness(int core) : saw_(std::make_unique<Saw>()) {
+  CoreWitness(int core, Duration interval) : saw_(std::make_unique<Saw>()) {
     constexpr int kAboveInstances = 95;
-    auto started = Thread::start("witness", {.fifo = kAboveInstances, .nice = 0}, [core, saw = saw_.get()] {
-      cpu_set_t one;
-      CPU_ZERO(&one);
-      CPU_SET(static_cast<std::size_t>(core), &one);
-      if (::sched_setaffinity(0, sizeof one, &one) == 0) watch(*saw);
-    });
+    auto started =
+        Thread::start("witness", {.fifo = kAboveInstances, .nice = 0}, [core, interval, saw = saw_.get()] {
+          cpu_set_t one;
+          CPU_ZERO(&one);
+          CPU_SET(static_cast<std::size_t>(core), &one);
+          if (::sched_setaffinity(0, sizeof one, &one) == 0) watch(*saw, interval);
+        });
     if (started) thread_ = *std::move(started);
   }
   CoreWitness(const CoreWitness&) = delete;
   CoreWitness& operator=(const CoreWitness&) = delete;
   ~CoreWitness() { saw_->enough = true; }
 
-  /// At most so many cycles of an interval of 1 ms has the core taken so far. 0 for ever without the right to
+  /// At most so many cycles of that interval has the core taken so far. 0 for ever without the right to
   /// SCHED_FIFO.
   [[nodiscard]] std::uint64_t taken() const noexcept { return saw_->taken; }
 
@@ -41,16 +42,15 @@ class CoreWitness {
     std::atomic<bool> enough{false};
   };
 
-  static void watch(Saw& saw) noexcept {
+  static void watch(Saw& saw, Duration interval) noexcept {
     constexpr Duration kPause = std::chrono::microseconds(200);
-    constexpr Duration kCycle = std::chrono::milliseconds(1);
     for (TimePoint due = MonotonicClock::now() + kPause; !saw.enough; due = MonotonicClock::now() + kPause) {
       const timespec when = to_timespec(due);
       while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) != 0) {
       }
       const Duration late = MonotonicClock::now() - due;
-      // It may have been held up since its look before.
-      if (late > kPause) saw.taken += static_cast<std::uint64_t>((late + kPause) / kCycle + 1);
+      // It may have been held up since its look before; and others catch up after a stall.
+      if (late > kPause) saw.taken += static_cast<std::uint64_t>((late + kPause + interval / 2) / interval);
     }
   }
 

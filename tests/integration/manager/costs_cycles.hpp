@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -33,7 +34,7 @@ inline bool costs_cycles(Plant& plant, const std::string& instance,
                          const std::function<void(std::uint32_t round)>& disturb,
                          const std::function<void(std::string_view)>& say = say_further_round) {
   constexpr std::uint32_t kRounds = 8;
-  const CoreWitness witness(plant.status(instance).core);
+  const CoreWitness witness(plant.status(instance).core, std::chrono::milliseconds(1));
   for (std::uint32_t round = 1; round <= kRounds; ++round) {
     const std::uint64_t before = witness.taken();
     const std::uint64_t lost = lost_while(plant, instance, [&] { disturb(round); });

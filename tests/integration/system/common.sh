@@ -90,25 +90,23 @@ lost_while() {
   lost=$(($(task "$lost_task" lost_cycles) - lost_before))
 }
 
-# costs_no_cycle INSTANCE/TASK COMMAND...: `COMMAND... 1`, `COMMAND... 2` and so on, until the task has lost no cycle meanwhile.
-# A core stands still for other reasons, too: after a round with a loss follows a calm stretch of the same length. If each
-# round loses cycles, and half of the calm stretches do, the losses are the machine's. If it lost none in the calm before the
-# first round, they are not: some disturbances last.
+# costs_no_cycle INSTANCE/TASK COMMAND...: `COMMAND... 1`, `COMMAND... 2` and so on, until the task has lost no cycle meanwhile,
+# apart from those that a witness on the same core would have lost as well.
 costs_no_cycle() {
-  local of=$1 round rounds=8 began took lost disturbed before calm_with_loss=0
+  local of=$1 round rounds=8 before taken
   shift
-  lost_while "$of" sleep 1
-  before=$lost
+  coproc WITNESS { exec "$BIN/core_witness" "$(instance "${of%/*}" core)" "$(task "$of" interval_us)"; }
+  witnessed() { echo >&"${WITNESS[1]}" && read -r taken <&"${WITNESS[0]}" || fail "no witness"; }
+  witnessed
   for ((round = 1; round <= rounds; round++)); do
-    began=${EPOCHREALTIME//[.,]/}
+    before=$taken
     lost_while "$of" "$@" "$round"
-    [ "$lost" -ne 0 ] || return 0
-    disturbed=$lost took=$((${EPOCHREALTIME//[.,]/} - began))
-    lost_while "$of" sleep "$(printf '%d.%06d' $((took / 1000000)) $((took % 1000000)))"
-    [ "$lost" -eq 0 ] || calm_with_loss=$((calm_with_loss + 1))
-    echo "further round: System.$(basename "$0" .sh): $of lost $disturbed cycles in round $round, $lost in calm, $before in calm before"
+    witnessed
+    [ "$lost" -gt $((taken - before)) ] || break
+    echo "further round: System.$(basename "$0" .sh): $of lost $lost cycles in round $round, of which its core took $((taken - before)) at most"
   done
-  [ "$before" -gt 0 ] && [ "$calm_with_loss" -ge $((rounds / 2)) ] || fail "$of lost cycles in each of $rounds rounds, and in $calm_with_loss calm stretches of the same length"
+  kill "$WITNESS_PID" && wait "$WITNESS_PID" 2>/dev/null || true
+  [ "$round" -le "$rounds" ] || fail "$of lost cycles in each of $rounds rounds, more than its core took"
 }
 
 # until_true SECONDS COMMAND...
