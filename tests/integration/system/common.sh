@@ -90,8 +90,8 @@ lost_while() {
   lost=$(($(task "$lost_task" lost_cycles) - lost_before))
 }
 
-# costs_no_cycle INSTANCE/TASK COMMAND...: `COMMAND... 1`, `COMMAND... 2` and so on, until the task has lost no cycle meanwhile,
-# apart from those that a witness on the same core would have lost as well.
+# costs_no_cycle INSTANCE/TASK COMMAND...: `COMMAND... 1`, `COMMAND... 2` and so on, until the task has lost no cycle meanwhile.
+# Cycles that a witness on the same core would have lost as well do not count.
 costs_no_cycle() {
   local of=$1 round rounds=8 before taken
   shift
