@@ -12,9 +12,9 @@
 
 namespace plchost {
 
-/// A bare thread on a core, above all priorities of instances. Only the machine holds it up: another guest, or
-/// the kernel in a part that nobody may interrupt. Cycles that an instance loses there meanwhile are no fault
-/// of plchost.
+/// A bare thread on a core, above all priorities of instances. Only the machine holds it up: another guest,
+/// or the kernel in a part that nobody may interrupt. Cycles that an instance loses there meanwhile are no
+/// fault of plchost.
 class CoreWitness {
  public:
   CoreWitness(int core, Duration interval) : saw_(std::make_unique<Saw>()) {
