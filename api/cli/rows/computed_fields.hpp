@@ -22,4 +22,7 @@ namespace plchost {
 [[nodiscard]] dds::Computed<plc_ApplicationStatus, Row> computed_of(const plc_ApplicationStatus& status,
                                                                     bool loaded);
 
+/// The times of the last loss are from its planned release; null if no cycle had run before.
+[[nodiscard]] dds::Computed<plc_TaskStatistics, Row> computed_of(const plc_TaskStatistics& numbers);
+
 }  // namespace plchost

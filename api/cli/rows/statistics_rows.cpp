@@ -2,15 +2,14 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string_view>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "shm/base/duration_histogram.hpp"
-#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 
@@ -38,36 +37,6 @@ void add_histogram(Row& row, std::string_view name, const HistogramReport& histo
                        {"count", bar.count}});
   }
   row[fmt::format("{}_histogram", name)] = std::move(bars);
-}
-
-void add_loss(Row& row, const plc_CycleLoss& loss) {
-  row["last_loss_cycles"] = loss.lost;
-  row["last_loss_release"] = time_text(loss.release_unix_ns);
-  const auto after_release = [&loss](std::int64_t unix_ns) {
-    const bool none_had_run = loss.lost != 0 && loss.release_unix_ns == 0;
-    return none_had_run ? Row() : Row(to_us(wrapping_difference(unix_ns, loss.release_unix_ns)));
-  };
-  row["last_loss_start_us"] = after_release(loss.start_unix_ns);
-  row["last_loss_end_us"] = after_release(loss.end_unix_ns);
-}
-
-void add_counters(Row& row, const plc_TaskStatistics& numbers) {
-  constexpr double kNsPerSecond = 1e9;
-  constexpr double kPpmPerPercent = 1e4;
-  row["since_unix_s"] = static_cast<double>(numbers.since_unix_ns) / kNsPerSecond;
-  row["elapsed_s"] = static_cast<double>(numbers.elapsed_ns) / kNsPerSecond;
-  row["digits"] = numbers.digits;
-  row["cycles"] = numbers.cycles;
-  row["recorded"] = numbers.recorded;
-  row["lost_cycles"] = numbers.lost_cycles;
-  row["lost_consecutive"] = numbers.lost_consecutive;
-  row["lost_consecutive_max"] = numbers.lost_consecutive_max;
-  add_loss(row, numbers.last_loss);
-  row["lost_events"] = numbers.lost_events;
-  row["slots_last"] = numbers.slots_last;
-  row["slots_max"] = numbers.slots_max;
-  row["spin_sum_us"] = to_us(numbers.spin_sum_ns);
-  row["spin_share_percent"] = numbers.spin_ppm / kPpmPerPercent;
 }
 
 std::string local_time(std::int64_t unix_ns) {
@@ -104,7 +73,7 @@ std::string format_quantities(const StatisticsReport& report) {
 
 void add_statistics(Row& row, const StatisticsReport& report) {
   const plc_TaskStatistics& numbers = report.numbers;
-  add_counters(row, numbers);
+  row.update(to_row(numbers));
   add_summary(row, "latency", numbers.latency);
   add_histogram(row, "latency", report.latency);
   add_summary(row, "exec", numbers.execution);
@@ -118,8 +87,7 @@ void add_statistics(Row& row, const StatisticsReport& report) {
 
 std::string format_statistics(const StatisticsReport& report, PlotStyle style) {
   const plc_TaskStatistics& numbers = report.numbers;
-  Row counters;
-  add_counters(counters, numbers);
+  Row counters = to_row(numbers);
   counters.erase("since_unix_s");
   if (numbers.last_loss.lost == 0) {
     for (const char* field :
