@@ -10,13 +10,20 @@ install(DIRECTORY ${CMAKE_BINARY_DIR}/share/man/ DESTINATION ${CMAKE_INSTALL_MAN
 install(DIRECTORY ${CMAKE_BINARY_DIR}/share/bash-completion ${CMAKE_BINARY_DIR}/share/zsh ${CMAKE_BINARY_DIR}/share/fish
   DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT plchost)
 
-# The unit names absolute paths, and `cmake --install --prefix` may choose another prefix than was configured.
-install(CODE "
-  set(bin_folder \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}\")
-  set(doc_folder \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\")
-  configure_file(\"${PROJECT_SOURCE_DIR}/manager/plchostd.service.in\" \"${CMAKE_BINARY_DIR}/plchostd.service\" @ONLY)
-  file(INSTALL \"${CMAKE_BINARY_DIR}/plchostd.service\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/lib/systemd/system\")"
-  COMPONENT plchost)
+# Units name absolute paths, and `cmake --install --prefix` may choose another prefix than was configured.
+function(plchost_unit file)
+  cmake_path(GET file STEM LAST_ONLY name)
+  install(CODE "
+    set(bin_folder \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}\")
+    set(doc_folder \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\")
+    configure_file(\"${PROJECT_SOURCE_DIR}/${file}\" \"${CMAKE_BINARY_DIR}/${name}\" @ONLY)
+    file(INSTALL \"${CMAKE_BINARY_DIR}/${name}\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/lib/systemd/system\")"
+    COMPONENT plchost)
+endfunction()
+plchost_unit(manager/plchostd.service.in)
+if(TARGET plchost-modbus)
+  plchost_unit(instances/io/modbus/plchost-modbus@.service.in)
+endif()
 
 # For applications: their headers, and the flags that they are built with.
 install(FILES instances/plc_app.h instances/plc_app.hpp instances/plc_debug.h instances/plc_instance.h instances/plc_online_change.h instances/plc_variables.h instances/plc_variables.hpp

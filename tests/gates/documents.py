@@ -248,6 +248,7 @@ def phases(root):
 
 TABLES = {"figures": figures, "all-figures": all_figures, "topics": topics, "reload": reload_effects, "phases": phases}
 MADE_BY_TESTS = ("settings", "configuration", "commands", "modbus")
+UNIT_FOLDERS = ("manager", "instances/io/modbus")
 
 
 def commands_of(programs):
@@ -357,8 +358,8 @@ def file_faults(root, texts):
             for name in re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:cpp|hpp|h|c|py|sh|idl|md|svg))`", line):
                 if not (root / name).exists() and not (root / page).parent.joinpath(name).exists():
                     yield f"{page}:{number}: there is no file {name}"
-            for unit in re.findall(r"systemctl (?:-\S+ )*[a-z]+ (?:-\S+ )*([\w-]+)", line):
-                if not (root / "manager" / f"{unit}.service.in").exists():
+            for unit in re.findall(r"systemctl (?:-\S+ )*[a-z]+ (?:-\S+ )*([\w-]+@?)", line):
+                if not any((root / folder / f"{unit}.service.in").exists() for folder in UNIT_FOLDERS):
                     yield f"{page}:{number}: no unit of systemd is called {unit}"
 
 

@@ -25,11 +25,16 @@ DESTDIR=$cell/stage cmake --install "$build" --prefix /usr >"$cell/stage.log" ||
 files "$cell/stage/usr" | diff "$cell/there" - >"$cell/files.log" || fail "staged is >"
 grep -q '^ExecStart=/usr/bin/plchostd ' "$cell/stage/usr/lib/systemd/system/plchostd.service" || fail "the unit of /usr"
 
-echo "- the unit names what is there"
-unit=$prefix/lib/systemd/system/plchostd.service
-! grep -q '@' "$unit" || fail "$(grep '@' "$unit")"
-is "$(sed -n 's/^ExecStart=\([^ ]*\).*/\1/p' "$unit")" "$prefix/bin/plchostd" || fail "$(grep ExecStart "$unit")"
-for document in $(grep -oE 'file:[^ ]+' "$unit" | cut -d: -f2); do [ -f "$document" ] || fail "no $document"; done
+echo "- each unit names what is there"
+for unit in "$prefix"/lib/systemd/system/*.service; do
+  ! grep -q '@[a-z_]*@' "$unit" || fail "$(grep '@' "$unit")"
+  program=$(sed -n 's/^ExecStart=\([^ ]*\).*/\1/p' "$unit")
+  case $(basename "$unit") in
+    plchostd.service) is "$program" "$prefix/bin/plchostd" ;;
+    *) is "$program" "$prefix/bin/$(basename "$unit" @.service)" && [ -x "$program" ] ;;
+  esac || fail "$unit starts $program"
+  for document in $(grep -oE 'file:[^ ]+' "$unit" | cut -d: -f2); do [ -f "$document" ] || fail "no $document"; done
+done
 for link in $(grep -oE '\]\([^)#: ]+[)#]' "$documents/README.md" | tr -d '])(#'); do
   [ -e "$documents/$link" ] || case "$link" in *.h | *.hpp) ;; *) fail "README.md links to $link, which is not installed" ;; esac
 done
