@@ -156,6 +156,7 @@ class Collector {
     if (!variable.location.empty()) return add_located(variable, std::move(symbol));
     if (variable.constant) return;  // a constant of the C compiler
     symbol.value = fmt::format("(*__GET_GLOBAL_{}())", name);
+    if (add_block(variable.type, symbol, 0)) return;
     add_type(variable, std::move(symbol), variable.type, 0);
   }
   // Empty: none, or several.
@@ -192,18 +193,26 @@ class Collector {
 
   // A function block is a structure by itself, all else has its value in one.
   void add_member(const iec::Variable& variable, Symbol symbol, std::size_t depth) {
-    const std::string type = folded(Words(variable.type).take());
+    if (add_block(variable.type, symbol, depth + 1)) return;
+    symbol.value += ".value";
+    add_type(variable, std::move(symbol), variable.type, depth);
+  }
+
+  // false: it is no function block.
+  bool add_block(std::string_view declared, Symbol symbol, std::size_t depth) {
+    const std::string type = folded(Words(declared).take());
     if (const iec::Pou* const block = project_.pou(type)) {
       symbol.name += ".";
       symbol.value += ".";
-      return add_all(*block, symbol, depth + 1);
+      add_all(*block, symbol, depth);
+      return true;
     }
     const auto* const standard = std::ranges::find_if(kStandardBlocks, [&](const StandardBlock& known) {
       return known.names.find(fmt::format(" {} ", type)) != std::string_view::npos;
     });
-    if (standard != kStandardBlocks.end()) return add_standard(*standard, symbol);
-    symbol.value += ".value";
-    add_type(variable, std::move(symbol), variable.type, depth);
+    if (standard == kStandardBlocks.end()) return false;
+    add_standard(*standard, symbol);
+    return true;
   }
 
   void add_standard(const StandardBlock& block, const Symbol& within) {

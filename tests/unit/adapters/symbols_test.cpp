@@ -64,6 +64,20 @@ TEST(MatiecSymbols, AreOfProgramsBlocksAndGlobals) {
   EXPECT_EQ(found.at("total").task, "");  // two tasks use it
 }
 
+TEST(MatiecSymbols, AreOfGlobalBlocks) {
+  const Symbols told = symbols(
+      "FUNCTION_BLOCK Pump VAR_INPUT go : BOOL; END_VAR ; END_FUNCTION_BLOCK\n"
+      "PROGRAM Main VAR_EXTERNAL late : TON; left : Pump; END_VAR ; END_PROGRAM",
+      "VAR_GLOBAL late : TON; left : Pump; END_VAR", "PROGRAM one WITH fast : Main;");
+  const auto found = by_name(told);
+  EXPECT_THAT(found, SizeIs(5));
+  EXPECT_EQ(found.at("late.ET").value, "(*__GET_GLOBAL_LATE()).ET.value");
+  EXPECT_EQ(found.at("left.go").value, "(*__GET_GLOBAL_LEFT()).GO.value");
+  EXPECT_EQ(found.at("left.go").task, "fast");
+  EXPECT_THAT(told.instances, Contains(testing::Field(&SymbolInstance::path, "left")));
+  EXPECT_THAT(told.remarks, testing::IsEmpty());
+}
+
 TEST(MatiecSymbols, TellTheElementsOfArraysAndTheMembersOfStructures) {
   const auto found = by_name(
       symbols("TYPE Point : STRUCT x, y : REAL; tags : ARRAY[1..3] OF INT; name : STRING; END_STRUCT;\n"
