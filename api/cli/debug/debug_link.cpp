@@ -9,7 +9,6 @@
 #include "api/dds/text.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
 
 namespace plchost {
 
@@ -31,21 +30,27 @@ Result<nlohmann::json> parsed(std::string_view text) {
 
 }  // namespace
 
-Result<std::string> DebugLink::call(std::int32_t operation, const std::string& argument) {
-  PLCHOST_TRY_ASSIGN(auto* const client, session_.client());
-  ApiRequest request;
-  request.host = host_;
-  request.operation = operation;
-  request.instance = instance_;
-  request.argument = argument;
-  PLCHOST_TRY_ASSIGN(auto reply, client->call(request, session_.deadline(kWritePatience)));
-  if (reply.code != ErrorCode::ok) return failure(reply.code, reply.text);
-  return std::move(reply.text);
+DebugRequests debug_requests(CliSession& session, const std::string& host, const std::string& instance) {
+  return {
+      .call = [&session, host, instance](ControlVerb verb,
+                                         const std::string& argument) -> Result<std::string> {
+        PLCHOST_TRY_ASSIGN(auto* const client, session.client());
+        const ApiRequest request{.host = host,
+                                 .operation = static_cast<std::int32_t>(verb),
+                                 .instance = instance,
+                                 .argument = argument};
+        PLCHOST_TRY_ASSIGN(auto reply, client->call(request, session.deadline(kWritePatience)));
+        if (reply.code != ErrorCode::ok) return failure(reply.code, reply.text);
+        return std::move(reply.text);
+      },
+      .list_variables = [&session, host, instance](const VariableQuery& query) -> Result<VariableListing> {
+        PLCHOST_TRY_ASSIGN(auto* const client, session.client());
+        return client->list_variables(host, instance, query, session.deadline());
+      }};
 }
 
 Result<std::string> DebugLink::attach(bool take) {
-  PLCHOST_TRY_ASSIGN(const auto text,
-                     call(static_cast<std::int32_t>(ControlVerb::debug), take ? "attach take" : "attach"));
+  PLCHOST_TRY_ASSIGN(const auto text, requests_.call(ControlVerb::debug, take ? "attach take" : "attach"));
   PLCHOST_TRY_ASSIGN(const auto answer, parsed(text));
   number_ = answer.value("session", std::uint64_t{0});
   if (number_ == 0) return bad_answer(text);
@@ -61,14 +66,13 @@ Result<void> DebugLink::detach() {
 }
 
 Result<nlohmann::json> DebugLink::command(const std::string& text) {
-  PLCHOST_TRY_ASSIGN(const auto answer, call(static_cast<std::int32_t>(ControlVerb::debug),
-                                             fmt::format("{} {}", number_, text)));
+  PLCHOST_TRY_ASSIGN(const auto answer,
+                     requests_.call(ControlVerb::debug, fmt::format("{} {}", number_, text)));
   return parsed(answer);
 }
 
 Result<DebugLink::Part> DebugLink::part(std::size_t offset) {
-  auto answer =
-      call(static_cast<std::int32_t>(ControlVerb::read_debug), fmt::format("{} {}", number_, offset));
+  auto answer = requests_.call(ControlVerb::read_debug, fmt::format("{} {}", number_, offset));
   if (!answer && answer.error().code == ErrorCode::not_found && number_ != 0) {
     return failure(
         ErrorCode::wrong_state,
@@ -107,11 +111,10 @@ Result<nlohmann::json> DebugLink::state() {
 }
 
 Result<std::vector<plc_VariableRecord>> DebugLink::variables(const std::string& pattern) {
-  PLCHOST_TRY_ASSIGN(auto* const client, session_.client());
   std::vector<plc_VariableRecord> all;
   VariableQuery query{.patterns = {pattern}, .forced = false, .after = 0};
   for (bool goes_on = true; goes_on;) {
-    PLCHOST_TRY_ASSIGN(auto page, client->list_variables(host_, instance_, query, session_.deadline()));
+    PLCHOST_TRY_ASSIGN(auto page, requests_.list_variables(query));
     PLCHOST_TRY_ASSIGN(goes_on, next_page(host_, page, query));
     std::ranges::move(page.variables, std::back_inserter(all));
   }
@@ -133,8 +136,7 @@ Result<std::string> DebugLink::write(const std::string& instance, const std::str
                                      const std::string& value) {
   PLCHOST_TRY_ASSIGN(const auto found, variable(instance, name));
   std::string whole(dds::text_of(found.name));
-  PLCHOST_TRY(
-      call(static_cast<std::int32_t>(ControlVerb::write_variable), fmt::format("{}={}", whole, value)));
+  PLCHOST_TRY(requests_.call(ControlVerb::write_variable, fmt::format("{}={}", whole, value)));
   return whole;
 }
 

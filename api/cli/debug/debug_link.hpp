@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <functional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,15 +10,28 @@
 #include <nlohmann/json.hpp>
 
 #include "api/cli/cli_session.hpp"
+#include "api/dds/variable_page.hpp"
+#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
 
+/// The requests of a debugger to the host of its instance.
+struct DebugRequests {
+  /// The text of the answer to an operation.
+  std::function<Result<std::string>(ControlVerb verb, const std::string& argument)> call;
+  std::function<Result<VariableListing>(const VariableQuery&)> list_variables;
+};
+
+/// The same over DDS. The session outlives them.
+[[nodiscard]] DebugRequests debug_requests(CliSession& session, const std::string& host,
+                                           const std::string& instance);
+
 /// A debug session with one instance: see instances/debugging.md.
 class DebugLink {
  public:
-  DebugLink(CliSession& session, std::string host, std::string instance)
-      : session_(session), host_(std::move(host)), instance_(std::move(instance)) {}
+  DebugLink(DebugRequests requests, std::string host, std::string instance)
+      : requests_(std::move(requests)), host_(std::move(host)), instance_(std::move(instance)) {}
 
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
 
@@ -43,7 +55,6 @@ class DebugLink {
                                           const std::string& value);
 
  private:
-  [[nodiscard]] Result<std::string> call(std::int32_t operation, const std::string& argument);
   /// The rest of a part, and what its head says.
   struct Part {
     std::uint64_t version = 0;
@@ -52,7 +63,7 @@ class DebugLink {
   };
   [[nodiscard]] Result<Part> part(std::size_t offset);
 
-  CliSession& session_;
+  DebugRequests requests_;
   std::string host_;
   std::string instance_;
   std::uint64_t number_ = 0;

@@ -78,11 +78,11 @@ int run_console(DebugLink& link, const DebugArguments& arguments) {
 }
 
 int debug(CliSession& session, const DebugArguments& arguments) {
-  auto host = session.target_host();
+  const auto host = session.target_host();
   if (!host) return CliSession::fail(host.error());
   if (const auto known = session.check_instance(arguments.instance); !known)
     return CliSession::fail(known.error());
-  DebugLink link(session, *std::move(host), arguments.instance);
+  DebugLink link(debug_requests(session, *host, arguments.instance), *host, arguments.instance);
   try {
     if (arguments.dap == kNoPort) return run_console(link, arguments);
     const auto served = serve_dap(link, static_cast<std::uint16_t>(arguments.dap), arguments.take);
