@@ -109,6 +109,7 @@ DapSession::Answer DapSession::carry_out(const std::string& command, const Json&
                 {"supportsLogPoints", true},
                 {"supportsSetVariable", true},
                 {"supportsEvaluateForHovers", true},
+                {"supportsClipboardContext", true},
                 {"supportsSingleThreadExecutionRequests", true},
                 {"supportTerminateDebuggee", false}};
   }

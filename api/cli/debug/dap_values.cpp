@@ -3,6 +3,7 @@
 
 #include "api/cli/debug/dap_session.hpp"
 #include "api/cli/debug/foreign_json.hpp"
+#include "api/cli/rows/variable_rows.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/trimmed.hpp"
 
@@ -12,13 +13,27 @@ namespace {
 
 using Json = nlohmann::json;
 
+// In the value's text, as that is all that every editor shows.
+std::string marked_value(const plc_VariableRecord& variable) {
+  const std::string_view forced = forced_text(variable);
+  const std::string_view value = dds::text_of(variable.value);
+  return forced.empty() ? std::string(value) : fmt::format("{} ({})", value, forced);
+}
+
+// An editor offers the text that it shows as the new value. A string that ends so is written in quotes.
+std::string without_mark(std::string value) {
+  constexpr std::string_view kMark = " (forced)";
+  if (value.ends_with(kMark)) value.erase(value.size() - kMark.size());
+  return value;
+}
+
 Json variable_json(const plc_VariableRecord& variable, std::string_view prefix) {
   std::string name(dds::text_of(variable.name));
   const std::string whole = name;
   if (name.size() > prefix.size() && name.starts_with(prefix)) name.erase(0, prefix.size());
   return {{"name", name},
           {"evaluateName", whole},
-          {"value", dds::text_of(variable.value)},
+          {"value", marked_value(variable)},
           {"type", dds::text_of(variable.type)},
           {"variablesReference", 0}};
 }
@@ -70,10 +85,10 @@ DapSession::Answer DapSession::written(const std::string& instance, const std::s
 
 DapSession::Answer DapSession::set_variable(const Json& arguments) {
   return written(instance_of(number_in(arguments, "variablesReference")), text_in(arguments, "name"),
-                 text_in(arguments, "value"));
+                 without_mark(text_in(arguments, "value")));
 }
 
-// A name, or in the debug console "NAME := VALUE".
+// A name, or in the debug console "NAME := VALUE". For the clipboard: the value alone.
 DapSession::Answer DapSession::evaluate(const Json& arguments) {
   const std::string expression = text_in(arguments, "expression");
   const std::string instance = instance_of(number_in(arguments, "frameId"));
@@ -85,6 +100,7 @@ DapSession::Answer DapSession::evaluate(const Json& arguments) {
   } else {
     PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(instance, trim(expression)));
     made = variable_json(variable, "");
+    if (text_in(arguments, "context") == "clipboard") (*made)["value"] = dds::text_of(variable.value);
   }
   if (!made) return made;
   return Json{{"result", (*made)["value"]}, {"type", (*made)["type"]}, {"variablesReference", 0}};

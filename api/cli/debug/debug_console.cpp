@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/interrupt.hpp"
+#include "api/cli/rows/variable_rows.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -189,8 +190,9 @@ Result<void> DebugConsole::print(const std::string& name) {
     found.push_back(one);
   }
   for (const auto& variable : found) {
-    print_line(fmt::format("{} = {}{}", dds::text_of(variable.name), dds::text_of(variable.value),
-                           variable.forced ? "  forced" : ""));
+    const std::string_view forced = forced_text(variable);
+    print_line(fmt::format("{} = {}{}{}", dds::text_of(variable.name), dds::text_of(variable.value),
+                           forced.empty() ? "" : "  ", forced));
   }
   return {};
 }

@@ -10,8 +10,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/interrupt.hpp"
-#include "api/cli/rows/rows.hpp"
-#include "api/dds/text.hpp"
+#include "api/cli/rows/variable_rows.hpp"
 
 namespace plchost {
 
@@ -25,14 +24,6 @@ struct RecordArguments {
   std::string file;       // empty: the standard output
 };
 
-/// As RFC 4180 has it.
-std::string csv_cell(std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-  std::string cell = "\"";
-  for (const char c : text) cell.append(c == '"' ? 2 : 1, c);
-  return cell + "\"";
-}
-
 /// Writes samples as CSV: a line with the names, then one for each sample.
 class Recording {
  public:
@@ -40,13 +31,7 @@ class Recording {
 
   /// wrong_state: the application has other variables by now. system: the file takes no more.
   Result<void> add(const VariableListing& sample) {
-    std::string names = "time,time_unix_ns,consistent";
-    std::string line =
-        fmt::format("{},{},{}", time_text(sample.time_unix_ns), sample.time_unix_ns, sample.consistent);
-    for (const plc_VariableRecord& variable : sample.variables) {
-      names += "," + csv_cell(dds::text_of(variable.name));
-      line += "," + csv_cell(dds::text_of(variable.value));
-    }
+    std::string names = recording_head(sample);
     if (names_.empty()) {
       fmt::print(file_, "{}\n", names);
       names_ = std::move(names);
@@ -54,7 +39,7 @@ class Recording {
       return failure(ErrorCode::wrong_state,
                      "the application has other variables than when the recording began");
     }
-    fmt::print(file_, "{}\n", line);
+    fmt::print(file_, "{}\n", recording_line(sample));
     ++samples_;
     if (std::fflush(file_) != 0 || std::ferror(file_) != 0)
       return failure(ErrorCode::system, "cannot write the recording", errno);

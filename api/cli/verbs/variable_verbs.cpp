@@ -44,16 +44,21 @@ Result<VariableSampler> sampler_of(CliSession& session, const VariableArguments&
                          {.patterns = arguments.names, .forced = forced, .after = 0});
 }
 
+// Programs are told the fields as control.idl has them.
+int show_variables(const CliSession& session, const VariableSampler& sampler,
+                   const std::vector<plc_VariableRecord>& variables, std::vector<Column> columns) {
+  std::vector<Row> rows;
+  for (const plc_VariableRecord& variable : variables) rows.push_back(to_row(variable, owner_of(sampler)));
+  if (!session.options.json && !session.options.csv) mark_forced_arrays(rows);
+  return session.show(std::move(rows), std::move(columns));
+}
+
 int list_variables(CliSession& session, const VariableArguments& arguments) {
   auto sampler = sampler_of(session, arguments);
   if (!sampler) return CliSession::fail(sampler.error());
   const auto variables = sampler->all();
   if (!variables) return CliSession::fail(variables.error());
-  std::vector<Row> rows;
-  for (const plc_VariableRecord& variable : *variables) {
-    rows.push_back(to_row(variable, owner_of(*sampler)));
-  }
-  return session.show(std::move(rows), columns_of<plc_VariableRecord>());
+  return show_variables(session, *sampler, *variables, columns_of<plc_VariableRecord>());
 }
 
 const std::vector<Column>& value_columns() {
@@ -71,11 +76,7 @@ int read_variables(CliSession& session, const VariableArguments& arguments) {
   if (!sample->consistent && !session.options.quiet) {
     fmt::print(stderr, "plcctl: a task was within a cycle: these values may be of different cycles\n");
   }
-  std::vector<Row> rows;
-  for (const plc_VariableRecord& variable : sample->variables) {
-    rows.push_back(to_row(variable, owner_of(*sampler)));
-  }
-  return session.show(std::move(rows), value_columns());
+  return show_variables(session, *sampler, sample->variables, value_columns());
 }
 
 /// One request for each, in their order; the first that fails ends it.
@@ -152,9 +153,10 @@ void print_change(const CliSession& session, const VariableSampler& sampler, con
     fmt::print("{}\n", json_text(row));
     return;
   }
-  fmt::print("{}  {}  {}{}\n", time_text(sample.time_unix_ns),
+  const std::string_view forced = forced_text(variable);
+  fmt::print("{}  {}  {}{}{}\n", time_text(sample.time_unix_ns),
              printable(std::string(dds::text_of(variable.name))),
-             printable(std::string(dds::text_of(variable.value))), variable.forced ? "  forced" : "");
+             printable(std::string(dds::text_of(variable.value))), forced.empty() ? "" : "  ", forced);
 }
 
 int watch_variables(CliSession& session, const WatchVariablesArguments& arguments) {

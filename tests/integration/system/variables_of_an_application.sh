@@ -58,6 +58,9 @@ is "$(field line.total forced),$(field line.total forced_value),$(field line.set
 is "$(plcctl read variable line1 line.total line.setpoint --json | jq -r 'map("\(.forced) \(.forced_value)") | join(",")')" "false null,true 7" ||
   fail "$(plcctl read variable line1 line.total line.setpoint --json)"
 plcctl read variable line1 line.total | grep -Eq '^line\.total +7 +7$' || fail "$(plcctl read variable line1 line.total)"
+plcctl read variable line1 grid | grep -Eq '^grid.* elements$' || fail "$(plcctl read variable line1 grid)"
+is "$(plcctl read variable line1 grid --json | jq -r '"\(.[0].forced) \(.[0].forced_value)"')" "true null" || fail "a forced array in JSON"
+is "$(plcctl record variables line1 line.total line.setpoint --duration 0.05 | awk -F, 'NR > 1 { print $NF; exit }')" line.total || fail "a recording does not say what is forced"
 plcctl watch variables line1 line.total --count 1 | grep -q '  forced$' || fail "watch does not say that it is forced"
 is "$(plcctl watch variables line1 line.total --count 1 --json | jq -r .forced)" true || fail "watch --json"
 is "$(instance line1 forces)" 2 || fail "$(instance line1 forces)"
@@ -74,7 +77,7 @@ echo "- watched and recorded"
 plcctl watch variables line1 fast.count --interval 0.02 --count 5 --json >"$cell/watched.txt"
 is "$(jq -r .value "$cell/watched.txt" | sort -n | uniq | wc -l)" 5 || fail "$(cat "$cell/watched.txt")"
 plcctl record variables line1 'fast.*' line.label --interval 0.02 --duration 1 --file "$cell/record.csv"
-is "$(head -n 1 "$cell/record.csv")" "time,time_unix_ns,consistent,fast.count,fast.twice,line.label" || fail "$(head -n 3 "$cell/record.csv")"
+is "$(head -n 1 "$cell/record.csv")" "time,time_unix_ns,consistent,fast.count,fast.twice,line.label,forced" || fail "$(head -n 3 "$cell/record.csv")"
 [ "$(wc -l <"$cell/record.csv")" -gt 5 ] || fail "$(cat "$cell/record.csv")"
 awk -F, 'NR > 1 && $4 * 2 != $5 { exit 1 }' "$cell/record.csv" || fail "two values of different cycles: $(cat "$cell/record.csv")"
 

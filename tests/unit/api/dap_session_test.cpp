@@ -1,0 +1,103 @@
+// The answers to a client of the Debug Adapter Protocol.
+#include "api/cli/debug/dap_session.hpp"
+
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/api/debugged_instance.hpp"
+
+namespace plchost {
+namespace {
+
+using nlohmann::json;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr int kInnermost = 1000;  // frames of the first thread
+constexpr int kCaller = 1002;
+
+class DapSessionTest : public testing::Test {
+ protected:
+  DapSessionTest() {
+    instance_.variables = {variable_record("Main.n", "INT", "1"), variable_record("Main.c.n", "INT", "2"),
+                           variable_record("Main.c.text", "STRING", "'on'"),
+                           variable_record("Main.c.t[]", "ARRAY [1..2] OF INT", "[3, 4]")};
+    instance_.halt("fast", 1,
+                   json::array({{{"pou", "Counter"}, {"line", 9}, {"file", "a.st"}, {"instance", "Main.c"}},
+                                {{"pou", "Twice"}, {"line", 3}, {"file", "a.st"}},
+                                {{"pou", "Main"}, {"line", 20}, {"file", "a.st"}, {"instance", "Main"}}}));
+    (void)ask("attach");
+  }
+
+  json answer(const std::string& command, const json& arguments = json::object()) {
+    sent_.clear();
+    EXPECT_TRUE(sut_.obey({{"seq", 1}, {"command", command}, {"arguments", arguments}}));
+    for (const json& message : sent_) {
+      if (message["type"] == "response") return message;
+    }
+    return {};
+  }
+  json ask(const std::string& command, const json& arguments = json::object()) {
+    const json response = answer(command, arguments);
+    EXPECT_TRUE(response["success"]) << response;
+    return response["body"];
+  }
+  // "NAME=VALUE" of each.
+  std::vector<std::string> shown(int reference) {
+    std::vector<std::string> all;
+    const json body = ask("variables", {{"variablesReference", reference}});
+    for (const json& one : body["variables"])
+      all.push_back(fmt::format("{}={}", one["name"].get<std::string>(), one["value"].get<std::string>()));
+    return all;
+  }
+  std::string result(const std::string& expression, const std::string& context) {
+    return ask("evaluate",
+               {{"expression", expression}, {"frameId", kInnermost}, {"context", context}})["result"];
+  }
+
+  DebuggedInstance instance_;
+  DebugLink link_{instance_.requests(), "cell", "line1"};
+  std::vector<json> sent_;
+  DapSession sut_{link_, [this](const json& message) { sent_.push_back(message); }, false};
+};
+
+class DapForces : public DapSessionTest {
+ protected:
+  DapForces() { instance_.force_all(); }
+};
+
+TEST_F(DapForces, AreShownBesideTheValue) {
+  EXPECT_THAT(shown(kInnermost),
+              ElementsAre("n=2 (forced)", "text='on' (forced)", "t[]=[3, 4] (elements forced)"));
+  for (const char* const context : {"hover", "watch", "repl"})
+    EXPECT_EQ(result("n", context), "2 (forced)") << context;
+}
+
+TEST_F(DapForces, AreNoPartOfACopiedValue) {
+  EXPECT_TRUE(ask("initialize")["supportsClipboardContext"]);
+  EXPECT_EQ(result("n", "clipboard"), "2");
+}
+
+// An editor offers the text that it shows.
+TEST_F(DapForces, AreNoPartOfAValueThatIsSet) {
+  const auto set = [&](const char* value) {
+    return ask("setVariable", {{"variablesReference", kInnermost}, {"name", "n"}, {"value", value}});
+  };
+  EXPECT_EQ(set("3 (forced)")["value"], "2 (forced)") << "as it is now";
+  (void)set("4");
+  EXPECT_THAT(instance_.written, ElementsAre("Main.c.n=3", "Main.c.n=4"));
+}
+
+TEST_F(DapSessionTest, GivesPlainValuesOfVariablesThatAreNotForced) {
+  EXPECT_THAT(shown(kInnermost), ElementsAre("n=2", "text='on'", "t[]=[3, 4]"));
+  EXPECT_EQ(result("n", "hover"), "2");
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "api/cli/debug/debug_link.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+inline plc_VariableRecord variable_record(std::string_view name, std::string_view type,
+                                          std::string_view value) {
+  plc_VariableRecord record{};
+  dds::copy_text(record.name, name);
+  dds::copy_text(record.type, type);
+  dds::copy_text(record.value, value);
+  return record;
+}
+
+/// Answers a debugger in the place of a host and its instance.
+struct DebuggedInstance {
+  nlohmann::json tasks = nlohmann::json::array();  ///< of its state
+  std::vector<plc_VariableRecord> variables;
+  std::vector<std::string> commands;  ///< that came, without the number of the session
+  std::vector<std::string> written;   ///< NAME=VALUE
+
+  /// Each variable to the value that it has; of arrays some elements.
+  void force_all() {
+    for (plc_VariableRecord& variable : variables) {
+      variable.forced = true;
+      if (!dds::text_of(variable.type).starts_with("ARRAY"))
+        dds::copy_text(variable.forced_value, dds::text_of(variable.value));
+    }
+  }
+
+  /// A halted task: its frames from the innermost on.
+  void halt(const std::string& task, int number, const nlohmann::json& stack) {
+    const nlohmann::json halted{
+        {"task", task}, {"state", "halted"}, {"halt", number}, {"reason", "pause"}, {"stack", stack}};
+    const auto known = std::ranges::find_if(tasks, [&](const auto& one) { return one["task"] == task; });
+    if (known == tasks.end()) {
+      tasks.push_back(halted);
+    } else {
+      *known = halted;
+    }
+  }
+
+  [[nodiscard]] DebugRequests requests() {
+    return {.call = [this](ControlVerb verb, const std::string& argument) { return answer(verb, argument); },
+            .list_variables = [this](const VariableQuery& query) { return list(query.patterns.front()); }};
+  }
+
+ private:
+  Result<std::string> answer(ControlVerb verb, const std::string& argument) {
+    if (verb == ControlVerb::read_debug) {
+      const std::string state = nlohmann::json{{"session", 1}, {"tasks", tasks}}.dump();
+      return fmt::format("1 {} {}", state.size(), state);
+    }
+    if (verb == ControlVerb::write_variable) {
+      written.push_back(argument);
+      return std::string();
+    }
+    if (argument.starts_with("attach")) return std::string(R"({"session":1})");
+    commands.push_back(argument.substr(argument.find(' ') + 1));
+    return std::string(R"({"id":1,"line":7})");
+  }
+
+  // "PATH.*", or a whole name.
+  Result<VariableListing> list(std::string_view pattern) {
+    const bool all = pattern.ends_with('*');
+    if (all) pattern.remove_suffix(1);
+    VariableListing page;
+    std::ranges::copy_if(variables, std::back_inserter(page.variables), [&](const auto& variable) {
+      const std::string_view name = dds::text_of(variable.name);
+      return all ? name.starts_with(pattern) : name == pattern;
+    });
+    if (page.variables.empty())
+      return failure(ErrorCode::not_found, fmt::format("no variable '{}'", pattern));
+    return page;
+  }
+};
+
+}  // namespace plchost
