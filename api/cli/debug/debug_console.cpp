@@ -32,11 +32,16 @@ constexpr std::array kCommands = {
     "continue [TASK|*]       pause [TASK|*]              wait [SECONDS]",
     "step [TASK]             next [TASK]                 out [TASK]          until PLACE",
     "stack [TASK]            print [NAME]                set NAME=VALUE      task NAME",
+    "frame [N]               up [N]                      down [N]            the frame of print and set",
     "halts all|one           help                        quit"};
 
 std::string place_text(const Json& frame) {
   return fmt::format("{}:{} ({}){}", frame.value("pou", ""), frame.value("line", 0U), frame.value("file", ""),
                      frame.contains("instance") ? "  " + frame.value("instance", "") : std::string());
+}
+
+std::string frame_text(std::size_t number, const Json& frame) {
+  return fmt::format("#{} {}", number, place_text(frame));
 }
 
 void print_line(std::string_view text) {
@@ -80,6 +85,9 @@ Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& r
       {"list", [](auto& self, const auto&) { return self.list(); }},
       {"tasks", [](auto& self, const auto&) { return self.tasks(); }},
       {"stack", &DebugConsole::stack},
+      {"frame", [](auto& self, const auto& number) { return self.choose_frame("frame", number); }},
+      {"up", [](auto& self, const auto& count) { return self.choose_frame("up", count); }},
+      {"down", [](auto& self, const auto& count) { return self.choose_frame("down", count); }},
       {"print", &DebugConsole::print},
       {"set", &DebugConsole::set},
       {"wait", &DebugConsole::wait},
@@ -140,7 +148,7 @@ Result<void> DebugConsole::choose(const std::string& task) {
   PLCHOST_TRY(look());
   if (task_in(state_, task) == nullptr)
     return failure(ErrorCode::not_found, fmt::format("no task '{}'", shown(task)));
-  task_ = task;
+  mean(task);
   return {};
 }
 
@@ -162,26 +170,68 @@ Result<void> DebugConsole::stack(const std::string& task) {
   if (found == nullptr || !found->contains("stack"))
     return failure(ErrorCode::wrong_state, fmt::format("task '{}' does not halt", shown(name)));
   std::size_t number = 0;
-  for (const Json& frame : (*found)["stack"]) print_line(fmt::format("#{} {}", number++, place_text(frame)));
-  task_ = name;
+  for (const Json& frame : (*found)["stack"]) print_line(frame_text(number++, frame));
+  mean(name);
   return {};
 }
 
-std::string DebugConsole::frame_instance() const {
+void DebugConsole::mean(const std::string& task) {
+  if (std::exchange(task_, task) != task) frame_ = 0;
+}
+
+Json DebugConsole::current_stack() const {
   const Json* const task = task_in(state_, task_);
-  if (task == nullptr || !task->contains("stack") || (*task)["stack"].empty()) return {};
-  return (*task)["stack"].front().value("instance", "");
+  return task == nullptr ? Json::array() : task->value("stack", Json::array());
+}
+
+// "frame N", and "up N" and "down N" from the frame that is chosen.
+Result<void> DebugConsole::choose_frame(std::string_view verb, const std::string& number) {
+  PLCHOST_TRY_ASSIGN(const auto task, task_or_current(""));
+  mean(task);
+  std::int64_t wanted = verb == "frame" ? frame_ : 1;
+  if (!number.empty()) {
+    std::uint32_t given = 0;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), given);
+    if (error != std::errc{} || end != number.data() + number.size()) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("'{}' is no number of a frame, or of frames", shown(number)));
+    }
+    wanted = given;
+  }
+  if (verb == "up") wanted = frame_ + wanted;
+  if (verb == "down") wanted = frame_ - wanted;
+  const Json stack = current_stack();
+  if (wanted < 0 || std::cmp_greater_equal(wanted, stack.size())) {
+    return failure(ErrorCode::not_found,
+                   fmt::format("no frame {}: task '{}' has the frames 0 to {}", wanted, shown(task_),
+                               static_cast<std::int64_t>(stack.size()) - 1));
+  }
+  frame_ = wanted;
+  const auto place = static_cast<std::size_t>(frame_);
+  print_line(frame_text(place, stack[place]));
+  return {};
+}
+
+// A state that is too long to be told has fewer frames than the stack.
+Result<std::string> DebugConsole::frame_instance() const {
+  const Json stack = current_stack();
+  if (stack.empty()) return std::string();
+  const auto place = static_cast<std::size_t>(frame_);
+  if (place < stack.size()) return stack[place].value("instance", "");
+  return failure(ErrorCode::wrong_state,
+                 fmt::format("frame {} of task '{}' is not told at present; ask again, or choose another one",
+                             frame_, shown(task_)));
 }
 
 Result<void> DebugConsole::print(const std::string& name) {
   PLCHOST_TRY(look());
-  const std::string instance = frame_instance();
+  PLCHOST_TRY_ASSIGN(const auto instance, frame_instance());
   std::vector<plc_VariableRecord> found;
   if (name.empty() && instance.empty()) {
     return failure(
         ErrorCode::wrong_state,
-        "no task halts in a program or function block; name a variable. Local variables of functions "
-        "are not seen");
+        "no task halts in a program or function block; name a variable, or go 'up' to a caller. Local "
+        "variables of functions are not seen");
   }
   if (name.empty() || name.find_first_of("*?") != std::string::npos) {
     PLCHOST_TRY_ASSIGN(found, link_.variables(name.empty() ? instance + ".*" : name));
@@ -206,7 +256,8 @@ Result<void> DebugConsole::set(const std::string& order) {
   while (!name.empty() && name.back() == ' ') name.pop_back();
   std::size_t begin = equal + 1;
   while (begin < order.size() && order[begin] == ' ') ++begin;
-  PLCHOST_TRY_ASSIGN(name, link_.write(frame_instance(), name, order.substr(begin)));
+  PLCHOST_TRY_ASSIGN(const auto instance, frame_instance());
+  PLCHOST_TRY_ASSIGN(name, link_.write(instance, name, order.substr(begin)));
   return print(name);
 }
 
@@ -264,6 +315,7 @@ void DebugConsole::take(const Json& state) {
   for (const auto& line : news_.lines(state)) print_line(line.is_gap ? line.text : "log: " + line.text);
   for (const Json& task : news_.halts(state)) {
     task_ = task.value("task", "");
+    frame_ = 0;
     print_halt(task);
   }
 }

@@ -34,6 +34,7 @@ class DebugConsole {
   [[nodiscard]] Result<void> list();
   [[nodiscard]] Result<void> tasks();
   [[nodiscard]] Result<void> stack(const std::string& task);
+  [[nodiscard]] Result<void> choose_frame(std::string_view verb, const std::string& number);
   [[nodiscard]] Result<void> print(const std::string& name);
   [[nodiscard]] Result<void> set(const std::string& order);
   [[nodiscard]] Result<void> go_on(std::string_view verb, const std::string& rest);
@@ -41,12 +42,16 @@ class DebugConsole {
   [[nodiscard]] Result<void> wait_for_halt(const std::string& task, Duration patience);
   [[nodiscard]] Result<void> choose(const std::string& task);
   [[nodiscard]] Result<std::string> task_or_current(const std::string& named);
-  [[nodiscard]] std::string frame_instance() const;
+  /// That is called in the chosen frame; empty: none. wrong_state: the frame is not told.
+  [[nodiscard]] Result<std::string> frame_instance() const;
+  [[nodiscard]] nlohmann::json current_stack() const;
+  void mean(const std::string& task);
   void take(const nlohmann::json& state);
 
   DebugLink& link_;
   nlohmann::json state_;
-  std::string task_;  // that halted last, or was named
+  std::string task_;        // that halted last, or was named
+  std::int64_t frame_ = 0;  // of its stack
   DebugNews news_;
   bool failed_ = false;
 };

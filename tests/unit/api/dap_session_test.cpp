@@ -99,5 +99,19 @@ TEST_F(DapSessionTest, GivesPlainValuesOfVariablesThatAreNotForced) {
   EXPECT_EQ(result("n", "hover"), "2");
 }
 
+TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
+  const json frames = ask("stackTrace", {{"threadId", 1}})["stackFrames"];
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[2]["id"], kCaller);
+  EXPECT_EQ(ask("scopes", {{"frameId", kInnermost}})["scopes"][0]["name"], "Main.c");
+  EXPECT_EQ(ask("scopes", {{"frameId", kInnermost + 1}})["scopes"].size(), 0U) << "a function";
+  const json scope = ask("scopes", {{"frameId", kCaller}})["scopes"][0];
+  EXPECT_EQ(scope["name"], "Main");
+  EXPECT_THAT(shown(scope["variablesReference"]), Contains("n=1"));
+  EXPECT_EQ(ask("evaluate", {{"expression", "n"}, {"frameId", kCaller}})["result"], "1");
+  (void)ask("setVariable", {{"variablesReference", kCaller}, {"name", "n"}, {"value", "5"}});
+  EXPECT_THAT(instance_.written, ElementsAre("Main.n=5"));
+}
+
 }  // namespace
 }  // namespace plchost

@@ -50,5 +50,79 @@ TEST_F(DebugConsoleTest, PrintSaysWhatIsForced) {
   EXPECT_EQ(said("print Main.t[]"), "Main.t[] = [3, 4]  elements forced\n");
 }
 
+class DebugConsoleFrames : public DebugConsoleTest {};
+
+TEST_F(DebugConsoleFrames, AreChosenByNumberAndByUpAndDown) {
+  (void)said("tasks");
+  EXPECT_EQ(said("frame"), "#0 Counter:9 (a.st)  Main.c\n");
+  EXPECT_EQ(said("up"), "#1 Twice:3 (a.st)\n");
+  EXPECT_EQ(said("up"), "#2 Main:20 (a.st)  Main\n");
+  EXPECT_EQ(said("down 2"), "#0 Counter:9 (a.st)  Main.c\n");
+  EXPECT_EQ(said("frame 2"), "#2 Main:20 (a.st)  Main\n");
+  EXPECT_EQ(said("frame"), "#2 Main:20 (a.st)  Main\n");
+  EXPECT_FALSE(sut_.failed());
+}
+
+TEST_F(DebugConsoleFrames, AreThoseOfPrintAndSet) {
+  EXPECT_THAT(said("print n"), HasSubstr("Main.c.n = 2\n"));
+  (void)said("frame 2");
+  EXPECT_EQ(said("print n"), "Main.n = 1\n");
+  EXPECT_THAT(said("print"), HasSubstr("Main.n = 1\n"));
+  (void)said("set n = 5");
+  (void)said("frame 0");
+  (void)said("set n = 6");
+  EXPECT_THAT(instance_.written, ElementsAre("Main.n=5", "Main.c.n=6"));
+}
+
+TEST_F(DebugConsoleFrames, OfAFunctionHaveNoInstance) {
+  (void)said("tasks");
+  (void)said("up");
+  EXPECT_THAT(said("print"), HasSubstr("Local variables of functions are not seen"));
+  EXPECT_EQ(said("print n"), "n = 7\n");
+}
+
+TEST_F(DebugConsoleFrames, BeginAnewWithAHaltAndWithAnotherTask) {
+  (void)said("frame 2");
+  instance_.halt("fast", 2, stack_);
+  EXPECT_THAT(said("frame"), HasSubstr("#0 Counter:9"));
+
+  (void)said("frame 2");
+  EXPECT_THAT(said("task fast"), Not(HasSubstr("plcctl:")));
+  EXPECT_THAT(said("frame"), HasSubstr("#2 Main:20")) << "the same task";
+  instance_.halt("slow", 1, json::array({stack_[2], stack_[2]}));
+  (void)said("tasks");
+  (void)said("up");
+  (void)said("task fast");
+  EXPECT_THAT(said("frame"), HasSubstr("#0 Counter:9"));
+  (void)said("up");
+  (void)said("stack slow");
+  EXPECT_THAT(said("frame"), HasSubstr("#0 Main:20"));
+}
+
+TEST_F(DebugConsoleFrames, ThatThereAreNotAreRefused) {
+  (void)said("tasks");
+  EXPECT_THAT(said("down"), HasSubstr("no frame -1: task 'fast' has the frames 0 to 2"));
+  EXPECT_THAT(said("frame 3"), HasSubstr("no frame 3"));
+  EXPECT_THAT(said("up 4294967295"), HasSubstr("no frame 4294967295"));
+  for (const char* const text : {"frame -1", "frame x", "up 1x", "down 99999999999"})
+    EXPECT_THAT(said(text), HasSubstr("is no number of a frame, or of frames")) << text;
+  EXPECT_THAT(said("frame"), HasSubstr("#0 Counter:9")) << "the same as before";
+  instance_.tasks = json::array({{{"task", "fast"}, {"state", "runs"}}});
+  EXPECT_THAT(said("up"), HasSubstr("no task halts"));
+}
+
+// A state that is too long to tell has fewer frames.
+TEST_F(DebugConsoleFrames, ThatAreNotToldAnyMoreMeanNoOther) {
+  (void)said("frame 2");
+  instance_.halt("fast", 1, json::array({stack_[0]}));
+  EXPECT_THAT(said("set n = 5"), HasSubstr("frame 2 of task 'fast' is not told at present"));
+  EXPECT_TRUE(instance_.written.empty());
+}
+
+TEST_F(DebugConsoleFrames, AreInTheHelp) {
+  const std::string help = said("help");
+  for (const char* const word : {"frame [N]", "up [N]", "down [N]"}) EXPECT_THAT(help, HasSubstr(word));
+}
+
 }  // namespace
 }  // namespace plchost
