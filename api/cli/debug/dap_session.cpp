@@ -8,6 +8,7 @@
 
 #include "api/cli/debug/foreign_json.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -42,6 +43,15 @@ Result<std::string> inner_part_in(const Json& wanted, const char* key) {
       return failure(ErrorCode::invalid_argument, fmt::format("{}: '{}' is not allowed in it", key, word));
   }
   return text;
+}
+
+// The words of a command have blanks between, so its place can have none.
+Result<std::string> place_in(std::string_view text, std::string_view what) {
+  std::string place(trimmed(text));
+  if (!place.empty() && place.find(' ') == std::string::npos && is_printable_utf8(place)) return place;
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is no name of {}, which is one word of characters that can be printed",
+                             shown(text), what));
 }
 
 // "PLACE hits COUNT if CONDITION log TEXT"
@@ -161,8 +171,8 @@ void DapSession::remove_of(const std::string& key) {
     (void)link_.command(fmt::format("delete {}", id));
 }
 
-Json DapSession::set_one(const std::string& key, const std::string& place, const Json& wanted) {
-  const auto order = order_of(place, wanted);
+Json DapSession::set_one(const std::string& key, const Result<std::string>& place, const Json& wanted) {
+  const auto order = place ? order_of(*place, wanted) : place;
   const auto answer = order ? link_.command(*order) : Result<Json>(std::unexpected(order.error()));
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
@@ -178,9 +188,12 @@ DapSession::Answer DapSession::set_breakpoints(const Json& arguments) {
       text_in(source, "path").empty() ? text_in(source, "name") : text_in(source, "path");
   if (path.empty()) return failure(ErrorCode::invalid_argument, "the source has no path and no name");
   remove_of(path);
+  const auto file = place_in(last_name(path), "a file");
   Json made = Json::array();
   for (const Json& wanted : list_in(arguments, "breakpoints")) {
-    made.push_back(set_one(path, fmt::format("{}:{}", last_name(path), number_in(wanted, "line")), wanted));
+    made.push_back(set_one(
+        path, file ? Result<std::string>(fmt::format("{}:{}", *file, number_in(wanted, "line"))) : file,
+        wanted));
   }
   return Json{{"breakpoints", std::move(made)}};
 }
@@ -189,7 +202,7 @@ DapSession::Answer DapSession::set_function_breakpoints(const Json& arguments) {
   remove_of(kFunctions);
   Json made = Json::array();
   for (const Json& wanted : list_in(arguments, "breakpoints"))
-    made.push_back(set_one(kFunctions, text_in(wanted, "name"), wanted));
+    made.push_back(set_one(kFunctions, place_in(text_in(wanted, "name"), "a POU"), wanted));
   return Json{{"breakpoints", std::move(made)}};
 }
 

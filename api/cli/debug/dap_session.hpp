@@ -42,7 +42,7 @@ class DapSession {
   [[nodiscard]] Answer attach(const Json& arguments);
   [[nodiscard]] Answer set_breakpoints(const Json& arguments);
   [[nodiscard]] Answer set_function_breakpoints(const Json& arguments);
-  [[nodiscard]] Json set_one(const std::string& key, const std::string& place, const Json& wanted);
+  [[nodiscard]] Json set_one(const std::string& key, const Result<std::string>& place, const Json& wanted);
   void remove_of(const std::string& key);
   [[nodiscard]] Answer threads();
   [[nodiscard]] Answer stack(const Json& arguments);

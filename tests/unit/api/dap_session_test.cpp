@@ -113,5 +113,26 @@ TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
   EXPECT_THAT(instance_.written, ElementsAre("Main.n=5"));
 }
 
+TEST_F(DapSessionTest, SetsFunctionBreakpointsByTheirNames) {
+  const json wanted = {{"breakpoints", json::array({{{"name", " Main "}, {"condition", "n > 5"}}})}};
+  EXPECT_TRUE(ask("setFunctionBreakpoints", wanted)["breakpoints"][0]["verified"]);
+  EXPECT_THAT(instance_.commands, ElementsAre("break Main if n > 5"));
+}
+
+TEST_F(DapSessionTest, LetsNoPlaceOfABreakpointHaveFurtherPartsOfTheCommand) {
+  for (const char* const name :
+       {"Main log x", "Main if n > 5", "Main hits =1", "Main\nlog", "", "two words"}) {
+    const json one =
+        ask("setFunctionBreakpoints", {{"breakpoints", json::array({{{"name", name}}})}})["breakpoints"][0];
+    EXPECT_FALSE(one["verified"]) << name;
+    EXPECT_THAT(one["message"], HasSubstr("is no name of a POU")) << name;
+  }
+  const json file = ask("setBreakpoints", {{"source", {{"path", "/src/a log b.st"}}},
+                                           {"breakpoints", json::array({{{"line", 7}}})}})["breakpoints"][0];
+  EXPECT_FALSE(file["verified"]);
+  EXPECT_THAT(file["message"], HasSubstr("'a log b.st' is no name of a file"));
+  EXPECT_THAT(instance_.commands, IsEmpty());
+}
+
 }  // namespace
 }  // namespace plchost
