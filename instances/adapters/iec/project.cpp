@@ -140,7 +140,20 @@ class ProjectReader {
   }
 
   void read_section(Variable::Section section, std::vector<Variable>& variables) {
+  // iec2c drops the first one in silence, and does not end at the other.
+  void refuse_section() {
+    constexpr const char* kConfig =
+        "VAR_CONFIG is not carried out; write the initial value, or the location, where the variable is "
+        "declared, and remove this section";
+    constexpr const char* kAccess =
+        "VAR_ACCESS is not carried out; remove this section, as clients see the variables of programs, and "
+        "globals, by their own names";
+    report(token().place, at("VAR_CONFIG") ? kConfig : kAccess);
+    skip_past("END_VAR");
+  }
+
     Variable begin{.name = "", .type = "", .location = "", .section = section, .place = take().place};
+    if (section == Variable::Section::other) return refuse_section();
     for (;;) {
       if (take("RETAIN")) {
         begin.retain = true;
@@ -152,7 +165,6 @@ class ProjectReader {
         break;
       }
     }
-    if (section == Variable::Section::other) return skip_past("END_VAR");
     while (!at_end() && !take("END_VAR")) read_declaration(begin, variables);
   }
 

@@ -142,6 +142,17 @@ TEST(IecProject, KnowsPersistentFromAVariableOfThatName) {
   EXPECT_EQ(variables[4].location, "%QW1");
 }
 
+TEST(IecProject, RefusesSectionsOfWhichACompilerKeepsNothing) {
+  const std::string begin = "CONFIGURATION c RESOURCE r ON PLC END_RESOURCE\n ";
+  EXPECT_THAT(
+      problems_of(begin + "VAR_CONFIG r.i.a : INT := 77; END_VAR END_CONFIGURATION"),
+      ElementsAre("a.st:2:2: VAR_CONFIG is not carried out; write the initial value, or the location, "
+                  "where the variable is declared, and remove this section"));
+  EXPECT_THAT(problems_of(begin + "VAR_ACCESS a : r.i.a : INT READ_ONLY; END_VAR END_CONFIGURATION"),
+              ElementsAre("a.st:2:2: VAR_ACCESS is not carried out; remove this section, as clients see "
+                          "the variables of programs, and globals, by their own names"));
+}
+
 // Each cut of a text, and each word left out: it comes to an end, and says nothing of a place outside.
 TEST(IecProject, ComesToAnEndWithAnyText) {
   for (std::size_t length = 0; length <= kLine.size(); ++length) {
