@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <iterator>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -80,13 +79,11 @@ class SectionSplitter {
       look_in_section(token);
     }
   }
-  void apply(std::string& text) const {
-    for (const auto& [offset, words] : std::views::reverse(insertions_)) text.insert(offset, words);
-  }
+  using Insertions = std::vector<std::pair<std::size_t, std::string>>;
+  /// By their offset in the source.
+  [[nodiscard]] const Insertions& insertions() const noexcept { return insertions_; }
 
  private:
-  using Insertions = std::vector<std::pair<std::size_t, std::string>>;
-
   void begin_section() {
     in_section_ = true;
     qualifiers_.clear();
@@ -124,7 +121,26 @@ class SectionSplitter {
   std::optional<std::size_t> end_;  // of the one before
 };
 
-std::string for_iec2c(const iec::Source& source) {
+struct TextForIec2c {
+  std::string text;
+  std::vector<iec::Stretch> inserted;
+};
+
+/// Inserts the words, and drops the mark of UTF-8.
+TextForIec2c with_insertions(std::string_view text, const SectionSplitter::Insertions& insertions) {
+  TextForIec2c result;
+  std::size_t done = iec::byte_order_mark(text);
+  for (const auto& [offset, words] : insertions) {
+    result.text += text.substr(done, offset - done);
+    result.inserted.push_back({result.text.size(), words.size()});
+    result.text += words;
+    done = offset;
+  }
+  result.text += text.substr(done);
+  return result;
+}
+
+TextForIec2c for_iec2c(const iec::Source& source) {
   constexpr std::string_view kAnyInterval = "T#1ms";
   std::string text = source.text;
   const iec::Tokens tokens = iec::tokens_of(text, source.file);
@@ -143,8 +159,7 @@ std::string for_iec2c(const iec::Source& source) {
       text.replace(token.offset, kAnyInterval.size(), kAnyInterval);
     }
   }
-  sections.apply(text);
-  return text.substr(iec::byte_order_mark(text));
+  return with_insertions(text, sections.insertions());
 }
 
 }  // namespace
@@ -153,7 +168,19 @@ JoinedSource::JoinedSource(std::span<const iec::Source> sources) {
   unsigned line = 1;
   for (const iec::Source& source : sources) {
     parts_.push_back({source.file, line});
-    const std::string text = for_iec2c(source);
+    const auto [text, inserted] = for_iec2c(source);
+    std::size_t at = 0;
+    std::size_t begin = 0;  // of the line
+    unsigned of_line = line;
+    for (const iec::Stretch& words : inserted) {
+      for (; at < words.offset; ++at) {
+        if (text[at] != '\n') continue;
+        begin = at + 1;
+        ++of_line;
+      }
+      insertions_.push_back(
+          {of_line, static_cast<unsigned>(words.offset - begin) + 1, static_cast<unsigned>(words.bytes)});
+    }
     text_ += text;
     if (!text.ends_with('\n')) text_ += '\n';
     line += static_cast<unsigned>(std::ranges::count(text, '\n')) + (text.ends_with('\n') ? 0U : 1U);
@@ -164,7 +191,11 @@ iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
   const auto after = std::ranges::upper_bound(parts_, line, {}, &Part::first_line);
   if (after == parts_.begin()) return {};
   const Part& part = *std::prev(after);
-  return {part.file, line - part.first_line + 1, column};
+  unsigned inserted = 0;
+  for (const Insertion& words : std::ranges::equal_range(insertions_, line, {}, &Insertion::line)) {
+    if (words.column < column) inserted += std::min(column - words.column, words.bytes);
+  }
+  return {part.file, line - part.first_line + 1, column - inserted};
 }
 
 }  // namespace plchost::matiec

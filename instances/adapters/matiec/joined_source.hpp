@@ -16,7 +16,7 @@ class JoinedSource {
  public:
   explicit JoinedSource(std::span<const iec::Source> sources);
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
-  /// Of a line of the joined file.
+  /// Of a place in the joined file.
   [[nodiscard]] iec::SourcePlace place(unsigned line, unsigned column) const;
 
  private:
@@ -24,7 +24,14 @@ class JoinedSource {
     std::string file;
     unsigned first_line;
   };
+  /// Words that are inserted, by where they stand in the joined file. In order.
+  struct Insertion {
+    unsigned line;
+    unsigned column;
+    unsigned bytes;
+  };
   std::vector<Part> parts_;
+  std::vector<Insertion> insertions_;
   std::string text_;
 };
 

@@ -67,6 +67,19 @@ TEST(TheJoinedSource, HasLocatedVariablesInSectionsOfTheirOwn) {
   }
 }
 
+TEST(TheJoinedSource, CountsColumnsWithoutTheSectionsThatItHasInserted) {
+  const JoinedSource joined(std::vector<iec::Source>{
+      {"0.st", "\n"},
+      {"a.st", "PROGRAM P\nVAR a : INT; b AT %QX0.0 : BOOL; c : NOSUCH; END_VAR\nEND_PROGRAM\n"}});
+  const auto column = [&](unsigned line, unsigned told) { return joined.place(line, told).column; };
+  EXPECT_EQ(joined.place(3, 58), (iec::SourcePlace{"a.st", 2, 34}));
+  EXPECT_EQ(column(3, 12), 12U) << "before the first one";
+  EXPECT_EQ(column(3, 13), 13U);
+  EXPECT_EQ(column(3, 20), 13U) << "a word that is inserted";
+  EXPECT_EQ(column(3, 26), 14U) << "between both";
+  EXPECT_EQ(column(4, 58), 58U) << "another line";
+}
+
 TEST(BuildOfAnApplication, SaysHowToGetACompiler) {
   const auto none = find_compiler("/nowhere");
   ASSERT_FALSE(none);
