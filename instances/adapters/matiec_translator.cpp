@@ -10,6 +10,7 @@
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/located.hpp"
+#include "instances/adapters/matiec/refused.hpp"
 #include "instances/adapters/matiec/statements.hpp"
 #include "instances/adapters/translator.hpp"
 
@@ -31,6 +32,8 @@ class MatiecTranslator : public Translator {
     std::ranges::move(problems, std::back_inserter(context_.report.problems));
     context_.refuse_persistent(context_.project, "MATIEC");
     if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
+    std::ranges::move(matiec::refused_words(context_.sources), std::back_inserter(context_.report.problems));
+    std::ranges::move(matiec::refused_names(context_.project), std::back_inserter(context_.report.problems));
     return context_.good();
   }
 

@@ -111,6 +111,7 @@ class ProjectReader {
 
   void read_pou(Pou::Kind kind, std::string_view end) {
     Pou pou{.kind = kind, .name = "", .variables = {}, .chart = "", .place = take().place};
+    pou.name_place = token().place;
     pou.name = take_name("this POU");
     while (!take_end(end, pou.name, pou.place)) {
       if (const SectionWord* const section = section_here()) {
@@ -139,7 +140,6 @@ class ProjectReader {
     return found == kSections.end() ? nullptr : found;
   }
 
-  void read_section(Variable::Section section, std::vector<Variable>& variables) {
   // iec2c drops the first one in silence, and does not end at the other.
   void refuse_section() {
     constexpr const char* kConfig =
@@ -152,8 +152,9 @@ class ProjectReader {
     skip_past("END_VAR");
   }
 
-    Variable begin{.name = "", .type = "", .location = "", .section = section, .place = take().place};
+  void read_section(Variable::Section section, std::vector<Variable>& variables) {
     if (section == Variable::Section::other) return refuse_section();
+    Variable begin{.name = "", .type = "", .location = "", .section = section, .place = take().place};
     for (;;) {
       if (take("RETAIN")) {
         begin.retain = true;

@@ -42,6 +42,7 @@ struct Pou {
   /// is none.
   std::string chart;
   SourcePlace place;
+  SourcePlace name_place = {};
 };
 
 struct Task {

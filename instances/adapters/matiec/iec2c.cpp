@@ -51,7 +51,7 @@ struct Declared {
 };
 std::vector<Declared> declared_names(const iec::Project& project) {
   std::vector<Declared> names;
-  for (const iec::Pou& pou : project.pous) names.push_back({iec::folded(pou.name), pou.place});
+  for (const iec::Pou& pou : project.pous) names.push_back({iec::folded(pou.name), pou.name_place});
   for (const iec::DeclaredType& type : project.types) names.push_back({iec::folded(type.name), type.place});
   return names;
 }

@@ -45,7 +45,7 @@ TEST(Iec2cErrors, InItsLibraryNameTheNameOfTheProgramThatItHasToo) {
   const std::string library = own_path("ieclib");
   std::ofstream(library) << "FUNCTION MAX\nVAR_INPUT P : INT; END_VAR\n";
   EXPECT_THAT(told(library + ":2-11..2-12: error: invalid\n" + library + ":2-11..2-12: error: again"),
-              ElementsAre("a.st:1:1: 'P' is also a name in the library of iec2c; choose another one"));
+              ElementsAre("a.st:1:9: 'P' is also a name in the library of iec2c; choose another one"));
   std::remove(library.c_str());
 }
 

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <span>
+
+#include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/source_place.hpp"
+
+namespace plchost::matiec {
+
+/// Names of which iec2c makes C that no compiler takes: macros of the headers that its C includes.
+[[nodiscard]] iec::SourceProblems refused_names(const iec::Project& project);
+
+/// Words at which iec2c ends without a place. Of each source the first one.
+[[nodiscard]] iec::SourceProblems refused_words(std::span<const iec::Source> sources);
+
+}  // namespace plchost::matiec

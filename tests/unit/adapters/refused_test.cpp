@@ -1,0 +1,58 @@
+#include "instances/adapters/matiec/refused.hpp"
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+namespace plchost::matiec {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::vector<std::string> described(const iec::SourceProblems& problems) {
+  std::vector<std::string> result;
+  for (const iec::SourceProblem& problem : problems) result.push_back(iec::describe(problem));
+  return result;
+}
+std::vector<iec::Source> source(const std::string& text) {
+  return {{"a.st", text}};
+}
+std::vector<std::string> names(const std::string& text) {
+  return described(refused_names(iec::read_project(source(text)).project));
+}
+std::vector<std::string> words(const std::string& text) {
+  return described(refused_words(source(text)));
+}
+
+TEST(RefusedByMatiec, AreNamesThatAreMacrosOfC) {
+  EXPECT_THAT(
+      names("PROGRAM Prg VAR nan : INT; eof : INT;\n rand_max : INT; a : INT; END_VAR END_PROGRAM"),
+      ElementsAre(HasSubstr("a.st:1:17: 'nan' is a macro of the C library"),
+                  HasSubstr("a.st:1:28: 'eof' is a macro"), HasSubstr("a.st:2:2: 'rand_max' is a macro")));
+  EXPECT_THAT(names("FUNCTION infinity : INT END_FUNCTION"), ElementsAre(HasSubstr("a.st:1:10: 'infinity'")));
+  EXPECT_THAT(names("TYPE\n Point : STRUCT x : REAL; NULL : REAL; END_STRUCT;\nEND_TYPE"),
+              ElementsAre(HasSubstr("a.st:2:2: 'NULL'")));
+  EXPECT_THAT(
+      names("CONFIGURATION c VAR_GLOBAL M_PI : REAL; END_VAR RESOURCE r ON PLC VAR_GLOBAL int_max : INT; "
+            "END_VAR END_RESOURCE END_CONFIGURATION"),
+      ElementsAre(HasSubstr("'M_PI'"), HasSubstr("'int_max'")));
+}
+
+TEST(RefusedByMatiec, IsNoNameOfWhichItMakesAnother) {
+  EXPECT_THAT(
+      names("TYPE Mode : (eof, nan); END_TYPE PROGRAM p VAR pi : REAL; m : Mode := eof; END_VAR END_PROGRAM"),
+      IsEmpty());
+}
+
+TEST(RefusedByMatiec, AreWideTexts) {
+  EXPECT_THAT(words("PROGRAM p VAR a : INT;\n b : wstring; c : WSTRING; END_VAR END_PROGRAM"),
+              ElementsAre(HasSubstr("a.st:2:6: WSTRING: iec2c cannot translate it")));
+  EXPECT_THAT(words("a := \"abc\";"), ElementsAre(HasSubstr("a.st:1:6: WSTRING")));
+  EXPECT_THAT(words("(* WSTRING *) a := 'WSTRING \"'; {WSTRING}"), IsEmpty());
+}
+
+}  // namespace
+}  // namespace plchost::matiec
