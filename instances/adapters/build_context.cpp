@@ -58,12 +58,17 @@ std::optional<ProgramEnd> BuildContext::run(const char* what, const std::vector<
 }
 
 bool BuildContext::compile(const char* what, std::vector<std::string> words,
-                           const CompileOrder& compile_order) {
+                           const CompileOrder& compile_order, const FindSource& find_source) {
   std::ranges::move(c_compiler_arguments(compile_order), std::back_inserter(words));
   const auto end = run(what, words, order.compile_limit);
-  if (end && !end->success())
-    fail(fmt::format("{} refuses what was written for it:{}", what, first_lines(end->output)));
-  return end && end->success();
+  if (!end || end->success()) return end.has_value();
+  for (const iec::SourceProblem& problem : problems_of_compiler(end->output, find_source))
+    fail({problem.place, fmt::format("{}: {}", what, problem.text)});
+  if (good()) {
+    fail(fmt::format("{} refuses what was written for it:{}", what,
+                     first_lines(std::string(from_first_error(end->output)))));
+  }
+  return false;
 }
 
 std::optional<std::vector<std::string>> BuildContext::words_of(const char* variable, const char* usual) {

@@ -8,6 +8,7 @@
 
 #include "instances/adapters/build_application.hpp"
 #include "instances/adapters/c_compiler.hpp"
+#include "instances/adapters/compiler_output.hpp"
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/run_program.hpp"
 #include "instances/adapters/work_folder.hpp"
@@ -42,8 +43,9 @@ class BuildContext {
   [[nodiscard]] const WorkFolder& folder() const { return *folder_; }
   /// Runs a program in that folder. Nothing: it has not run to its end.
   std::optional<ProgramEnd> run(const char* what, const std::vector<std::string>& command, Duration limit);
-  /// Runs a compiler for C or C++. `words`: its command.
-  bool compile(const char* what, std::vector<std::string> words, const CompileOrder& compile_order);
+  /// Runs a compiler for C or C++. `words`: its command. Errors in a source are told there.
+  bool compile(const char* what, std::vector<std::string> words, const CompileOrder& compile_order,
+               const FindSource& find_source);
   /// The words of the command in this variable of the environment; else `usual`.
   std::optional<std::vector<std::string>> words_of(const char* variable, const char* usual);
   [[nodiscard]] std::string adapters() const { return std::filesystem::absolute(order.adapters); }

@@ -19,6 +19,7 @@ namespace plchost {
 namespace {
 
 constexpr const char* kConfigurationFile = "plchost_configuration.c";
+constexpr const char* kCode = "POUS.c";
 
 class MatiecTranslator : public Translator {
  public:
@@ -31,21 +32,13 @@ class MatiecTranslator : public Translator {
     context_.project = std::move(project);
     std::ranges::move(problems, std::back_inserter(context_.report.problems));
     context_.refuse_persistent(context_.project, "MATIEC");
-    if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
     std::ranges::move(matiec::refused_words(context_.sources), std::back_inserter(context_.report.problems));
     std::ranges::move(matiec::refused_names(context_.project), std::back_inserter(context_.report.problems));
     return context_.good();
   }
 
   bool translate() override {
-    auto compiler = matiec::find_compiler(context_.order.matiec);
-    auto words = context_.words_of("CC", "cc");
-    if (!context_.has(compiler) || !words || !context_.open_folder()) return false;
-    compiler_ = *std::move(compiler);
-    words_ = *std::move(words);
-    const matiec::JoinedSource joined(context_.sources);
-    if (!context_.has(context_.folder().write(std::string(matiec::kJoinedFile), joined.text()))) return false;
-    return run(joined) && read_located() && (!context_.order.debug || instrument(joined));
+    return translate_sources() && read_located() && (context_.order.debug ? instrument() : drop_directives());
   }
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
@@ -58,11 +51,13 @@ class MatiecTranslator : public Translator {
     const std::string adapters = context_.adapters();
     std::vector<std::string> sources = context_.application_files();
     sources.insert(sources.begin(), {file, kConfigurationFile});
-    return context_.compile("the C compiler", words_,
-                            {.sources = std::move(sources),
-                             .folders = {adapters, adapters + "/application", adapters + "/matiec",
-                                         std::filesystem::absolute(compiler_.headers)},
-                             .output = made});
+    return context_.compile(
+        "the C compiler", words_,
+        {.sources = std::move(sources),
+         .folders = {adapters, adapters + "/application", adapters + "/matiec",
+                     std::filesystem::absolute(compiler_.headers)},
+         .output = made},
+        [this](const std::string& named, unsigned line) { return source_of(named, line); });
   }
 
  private:
@@ -72,6 +67,27 @@ class MatiecTranslator : public Translator {
 
   // iec2c makes a file of each of these names. The files of the library are found by name, too.
   void check_file_names() {
+  bool translate_sources() {
+    auto compiler = matiec::find_compiler(context_.order.matiec);
+    auto words = context_.words_of("CC", "cc");
+    if (!context_.has(compiler) || !words || !context_.open_folder()) return false;
+    compiler_ = *std::move(compiler);
+    words_ = *std::move(words);
+    joined_.emplace(context_.sources);
+    return context_.has(context_.folder().write(std::string(matiec::kJoinedFile), joined_->text())) && run();
+  }
+
+  // Of the C that is copied from a pragma, else of the statement that a line of C is made from.
+  [[nodiscard]] std::optional<iec::SourcePlace> source_of(const std::string& file, unsigned line) const {
+    if (std::filesystem::path(file).filename() != kCode) return std::nullopt;
+    const auto code = context_.folder().read(kCode);
+    if (!code) return std::nullopt;
+    if (auto place = place_in_pragma(matiec::line_in(*code, line), context_.sources)) return place;
+    const unsigned joined = matiec::joined_line_of(*code, line);
+    if (joined == 0) return std::nullopt;
+    return joined_->place(joined, 0);
+  }
+
     std::vector<std::string> names{"POUS", "LOCATED_VARIABLES", "IEC_STD_LIB", "ACCESSOR"};
     const auto check = [&](const char* kind, const std::string& given, const iec::SourcePlace& place) {
       const std::string name = iec::folded(given);
@@ -87,15 +103,14 @@ class MatiecTranslator : public Translator {
       check("RESOURCE", resource.name, resource.place);
   }
 
-  bool run(const matiec::JoinedSource& joined) {
+  bool run() {
     namespace fs = std::filesystem;
     std::vector<std::string> command{fs::absolute(compiler_.program), "-f", "-p", "-l"};
-    if (context_.order.debug) command.insert(command.end(), {"-O", "l"});
-    command.insert(command.end(),
-                   {"-I", fs::absolute(compiler_.library), "-T", ".", std::string(matiec::kJoinedFile)});
+    command.insert(command.end(), {"-O", "l", "-I", fs::absolute(compiler_.library), "-T", ".",
+                                   std::string(matiec::kJoinedFile)});
     const auto end = context_.run("iec2c", command, context_.order.translate_limit);
     if (!end) return false;
-    std::ranges::move(matiec::problems_of(end->output, joined, context_.project, compiler_.library),
+    std::ranges::move(matiec::problems_of(end->output, *joined_, context_.project, compiler_.library),
                       std::back_inserter(context_.report.problems));
     if (context_.good() && end->signal != 0) {
       context_.fail(
@@ -119,11 +134,16 @@ class MatiecTranslator : public Translator {
         fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
   }
 
-  bool instrument(const matiec::JoinedSource& joined) {
-    constexpr const char* kCode = "POUS.c";
+  bool drop_directives() {
+    const auto code = context_.folder().read(kCode);
+    return context_.has(code) &&
+           context_.has(context_.folder().replace(kCode, matiec::without_directives(*code)));
+  }
+
+  bool instrument() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return false;
-    auto made = matiec::with_statements(*code, joined);
+    auto made = matiec::with_statements(*code, *joined_);
     for (iec::DebugPou& pou : made.pous) {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }
@@ -141,6 +161,7 @@ class MatiecTranslator : public Translator {
 
 }  // namespace
 
+  std::optional<matiec::JoinedSource> joined_;
 std::unique_ptr<Translator> make_matiec_translator(BuildContext& context) {
   return std::make_unique<MatiecTranslator>(context);
 }

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cstring>
 #include <iterator>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -65,7 +67,8 @@ class StrucppTranslator : public Translator {
                             {.kind = CompileOrder::Kind::c_objects,
                              .sources = context_.application_files(),
                              .folders = {adapters, adapters + "/application"},
-                             .output = ""});
+                             .output = ""},
+                            [](const std::string&, unsigned) { return std::nullopt; });
   }
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
@@ -83,15 +86,26 @@ class StrucppTranslator : public Translator {
     std::vector<std::string> folders{adapters + "/application", adapters + "/strucpp", compiler_.headers,
                                      context_.folder().path()};
     if (context_.order.debug) folders.push_back(adapters);  // plc_debug.h
-    return context_.compile("the C++ compiler", words_,
-                            {.kind = CompileOrder::Kind::cpp_application,
-                             .sources = std::move(sources),
-                             .folders = std::move(folders),
-                             .output = made,
-                             .flags = flags_});
+    return context_.compile(
+        "the C++ compiler", words_,
+        {.kind = CompileOrder::Kind::cpp_application,
+         .sources = std::move(sources),
+         .folders = std::move(folders),
+         .output = made,
+         .flags = flags_},
+        [this](const std::string& named, unsigned line) { return source_of(named, line); });
   }
 
  private:
+  // The C++ has directives #line with the names that the compiler was given.
+  [[nodiscard]] std::optional<iec::SourcePlace> source_of(const std::string& file, unsigned line) const {
+    for (std::size_t i = 0; i < context_.sources.size(); ++i) {
+      const std::string& source = context_.sources[i].file;
+      if (file == name_for_compiler(source, i)) return iec::SourcePlace{source, line, 0};
+    }
+    return std::nullopt;
+  }
+
   // An online change allows no symbol that exists once in a process. Only g++ makes such, and has this flag.
   void find_flags() {
     const std::string flag = "-fno-gnu-unique";

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstddef>
 #include <optional>
+#include <ranges>
 
 #include <fmt/format.h>
 
@@ -13,7 +14,15 @@ namespace {
 
 constexpr std::string_view kBodyEnd = "_body__(";
 constexpr std::string_view kLine = "#line ";
+constexpr std::string_view kComment = "/* line ";
 constexpr std::string_view kFunction = "// FUNCTION";
+
+// Behind these words; 0: there is none.
+unsigned number_behind(std::string_view words, std::string_view line) {
+  unsigned number = 0;
+  if (line.starts_with(words)) std::from_chars(line.data() + words.size(), line.data() + line.size(), number);
+  return number;
+}
 
 // The last word before the first parenthesis.
 std::string_view name_before_parenthesis(std::string_view line) {
@@ -86,6 +95,33 @@ class Instrumenter {
 };
 
 }  // namespace
+
+std::string without_directives(std::string_view code) {
+  std::string text;
+  for (const auto part : std::views::split(code, '\n')) {
+    const std::string_view line(part.begin(), part.end());
+    const unsigned number = number_behind(kLine, line);
+    text += number == 0 ? std::string(line) : fmt::format("{}{} */", kComment, number);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string_view line_in(std::string_view code, unsigned line) {
+  for (; line > 1 && !code.empty(); --line)
+    code.remove_prefix(std::min(code.find('\n'), code.size() - 1) + 1);
+  return code.substr(0, code.find('\n'));
+}
+
+unsigned joined_line_of(std::string_view code, unsigned line) {
+  unsigned joined = 0;
+  for (const auto part : std::views::split(code, '\n') | std::views::take(line)) {
+    const std::string_view text(part.begin(), part.end());
+    if (text.starts_with('}')) joined = 0;  // the end of a body
+    if (const unsigned number = number_behind(kComment, text); number != 0) joined = number;
+  }
+  return joined;
+}
 
 DebugCode with_statements(std::string_view code, const JoinedSource& source) {
   return Instrumenter(code, source).run();

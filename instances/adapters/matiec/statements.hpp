@@ -18,4 +18,14 @@ struct DebugCode {
 /// `code`: POUS.c as "iec2c -O l" writes it, of this source: "#line N" is before each statement.
 [[nodiscard]] DebugCode with_statements(std::string_view code, const JoinedSource& source);
 
+/// The same code for a compiler: each directive becomes a comment, so that the code has lines of its own.
+[[nodiscard]] std::string without_directives(std::string_view code);
+
+/// A line of the code, from 1; empty: it has none of this number.
+[[nodiscard]] std::string_view line_in(std::string_view code, unsigned line);
+
+/// The line of the joined source of which the statement is that this line of the code belongs to. `code`: of
+/// without_directives(). 0: it belongs to none.
+[[nodiscard]] unsigned joined_line_of(std::string_view code, unsigned line);
+
 }  // namespace plchost::matiec

@@ -32,8 +32,10 @@ void GeneratedText::restore(iec::SourceProblem& problem) const {
   if (problem.place.line == 0 || origins_.empty()) return;
   const Origin& origin = origins_[std::min<std::size_t>(problem.place.line, origins_.size()) - 1];
   if (origin.body_line != 0) {
-    problem.text = fmt::format("{}, line {} of its body, column {}: {}", pous_[origin.pou], origin.body_line,
-                               problem.place.column, problem.text);
+    const std::string column =
+        problem.place.column == 0 ? "" : fmt::format(", column {}", problem.place.column);
+    problem.text = fmt::format("{}, line {} of its body{}: {}", pous_[origin.pou], origin.body_line, column,
+                               problem.text);
   }
   problem.place = {problem.place.file, origin.xml_line, 0};
 }

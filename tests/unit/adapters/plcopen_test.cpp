@@ -266,10 +266,12 @@ TEST(PlcopenXml, HasItsProblemsByTheLinesOfTheXml) {
                                          "\n<ST><xhtml:p><![CDATA[one;\n  two;]]></xhtml:p>\n<xhtml:p>three; "
                                          "&lt;&#10;four;\nfive;</xhtml:p></ST>"));
   StructuredText sut = read(xml);
-  const auto told = [&](std::string_view word) {
+  const auto line_of = [&](std::string_view word) {
     const std::string before = sut.text.text().substr(0, sut.text.text().find(word));
-    const auto line = static_cast<unsigned>(1 + std::ranges::count(before, '\n'));
-    iec::SourceProblem problem{{"a.xml", line, 3}, "wrong"};
+    return static_cast<unsigned>(1 + std::ranges::count(before, '\n'));
+  };
+  const auto told = [&](std::string_view word) {
+    iec::SourceProblem problem{{"a.xml", line_of(word), 3}, "wrong"};
     sut.text.restore(problem);
     return iec::describe(problem);
   };
@@ -281,6 +283,9 @@ TEST(PlcopenXml, HasItsProblemsByTheLinesOfTheXml) {
   EXPECT_EQ(told("five;"), "a.xml:10: Main, line 5 of its body, column 3: wrong");
   EXPECT_EQ(told("END_PROGRAM"), "a.xml:10: Main, line 5 of its body, column 3: wrong");
   EXPECT_EQ(told("TASK fast"), "a.xml:11: wrong");
+  iec::SourceProblem without_column{{"a.xml", line_of("two;"), 0}, "wrong"};
+  sut.text.restore(without_column);
+  EXPECT_EQ(iec::describe(without_column), "a.xml:8: Main, line 2 of its body: wrong");
   iec::SourceProblem of_the_file{{"a.xml", 0, 0}, "wrong"};
   sut.text.restore(of_the_file);
   EXPECT_EQ(iec::describe(of_the_file), "a.xml: wrong");

@@ -75,5 +75,17 @@ TEST(MatiecStatements, GetTheirMacros) {
   EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u};"));
 }
 
+TEST(TheCodeWithoutDirectives, HasTheLinesOfItsStatementsInComments) {
+  const std::string code =
+      without_directives("\nvoid A_body__(A *data__) {\n#line 7 \"joined.st\"\n  x;\n  y;\n}\nz;\n");
+  EXPECT_THAT(code, Not(HasSubstr("#line")));
+  EXPECT_EQ(line_in(code, 4), "  x;");
+  EXPECT_EQ(line_in(code, 100), "");
+  EXPECT_EQ(joined_line_of(code, 2), 0U);
+  EXPECT_EQ(joined_line_of(code, 4), 7U);
+  EXPECT_EQ(joined_line_of(code, 5), 7U);
+  EXPECT_EQ(joined_line_of(code, 7), 0U) << "behind the body";
+}
+
 }  // namespace
 }  // namespace plchost::matiec

@@ -1,0 +1,162 @@
+#include "instances/adapters/compiler_output.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <ranges>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kError = "error: ";
+constexpr std::string_view kNeeds = "required from";
+constexpr std::string_view kExpands = "note: in expansion of macro";
+constexpr std::size_t kMostProblems = 20;
+
+/// FILE:LINE:COLUMN: REST, or FILE:LINE: REST.
+struct Line {
+  std::string file;
+  unsigned line = 0;
+  std::string_view rest;
+};
+
+/// A number and a colon, which are taken from the text.
+std::optional<unsigned> take_number(std::string_view& text) {
+  unsigned number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto length = static_cast<std::size_t>(end - text.data());
+  if (error != std::errc() || !text.substr(length).starts_with(':')) return std::nullopt;
+  text.remove_prefix(length + 1);
+  return number;
+}
+
+std::optional<Line> line_of(std::string_view text) {
+  for (std::size_t colon = text.find(':'); colon != std::string_view::npos;
+       colon = text.find(':', colon + 1)) {
+    std::string_view rest = text.substr(colon + 1);
+    const auto number = take_number(rest);
+    if (!number) continue;
+    (void)take_number(rest);
+    rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+    return Line{.file = std::string(text.substr(0, colon)), .line = *number, .rest = rest};
+  }
+  return std::nullopt;
+}
+
+/// The text of an error; empty: the line tells something else.
+std::string_view text_of_error(std::string_view rest) {
+  constexpr std::string_view kFatal = "fatal ";
+  if (rest.starts_with(kFatal)) rest.remove_prefix(kFatal.size());
+  return rest.starts_with(kError) ? rest.substr(kError.size()) : std::string_view();
+}
+
+/// Each line of a compiler's output with a place.
+class ErrorReader {
+ public:
+  explicit ErrorReader(const FindSource& find_source) : find_source_(find_source) {}
+
+  void take(const Line& line) {
+    if (problems_.size() >= kMostProblems) return;
+    if (line.rest.starts_with(kNeeds)) {
+      if (auto place = find_source_(line.file, line.line)) needed_by_ = std::move(place);
+    } else if (line.rest.starts_with(kExpands)) {
+      if (!unplaced_.empty()) add(find_source_(line.file, line.line));
+    } else if (const std::string_view text = text_of_error(line.rest); !text.empty()) {
+      unplaced_ = text;
+      auto place = find_source_(line.file, line.line);
+      add(place ? std::move(place) : std::move(needed_by_));
+      needed_by_.reset();
+    }
+  }
+  [[nodiscard]] iec::SourceProblems problems() && { return std::move(problems_); }
+
+ private:
+  void add(std::optional<iec::SourcePlace> place) {
+    if (!place) return;
+    iec::SourceProblem problem{*std::move(place), std::exchange(unplaced_, "")};
+    if (std::ranges::find(problems_, problem) == problems_.end()) problems_.push_back(std::move(problem));
+  }
+
+  const FindSource& find_source_;
+  iec::SourceProblems problems_;
+  std::optional<iec::SourcePlace> needed_by_;  // of the template of which an error follows
+  std::string unplaced_;                       // an error whose place may follow
+};
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\r";
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+}
+
+/// Of a byte of the token.
+iec::SourcePlace place_in(const iec::Token& token, std::size_t offset) {
+  iec::SourcePlace place = token.place;
+  for (const char c : std::string_view(token.text).substr(0, offset)) {
+    ++place.column;
+    if (c != '\n') continue;
+    ++place.line;
+    place.column = 1;
+  }
+  return place;
+}
+
+std::vector<iec::Token> pragmas_in(const iec::Source& source) {
+  std::vector<iec::Token> tokens = iec::tokens_of(source.text, source.file).all;
+  std::erase_if(tokens, [](const iec::Token& token) { return token.kind != iec::Token::Kind::pragma; });
+  return tokens;
+}
+
+/// Without its braces.
+std::string_view code_in(const iec::Token& pragma) {
+  const std::string_view text = pragma.text;
+  const std::size_t braces = text.starts_with("{{") ? 2 : 1;
+  return text.size() < 2 * braces ? "" : text.substr(braces, text.size() - 2 * braces);
+}
+
+}  // namespace
+
+iec::SourceProblems problems_of_compiler(std::string_view output, const FindSource& find_source) {
+  ErrorReader reader(find_source);
+  for (const auto part : std::views::split(output, '\n')) {
+    if (const auto line = line_of(std::string_view(part.begin(), part.end()))) reader.take(*line);
+  }
+  return std::move(reader).problems();
+}
+
+std::string_view from_first_error(std::string_view output) {
+  for (std::size_t begin = 0; begin < output.size();) {
+    const std::size_t end = std::min(output.find('\n', begin), output.size());
+    const auto line = line_of(output.substr(begin, end - begin));
+    if (line && !text_of_error(line->rest).empty()) return output.substr(begin);
+    begin = end + 1;
+  }
+  return output;
+}
+
+std::optional<iec::SourcePlace> place_in_pragma(std::string_view line_of_c,
+                                                std::span<const iec::Source> sources) {
+  std::optional<iec::SourcePlace> found;
+  const std::string_view wanted = trimmed(line_of_c);
+  if (wanted.empty()) return found;
+  for (const iec::Source& source : sources) {
+    for (const iec::Token& pragma : pragmas_in(source)) {
+      for (const auto part : std::views::split(code_in(pragma), '\n')) {
+        if (trimmed(std::string_view(part.begin(), part.end())) != wanted) continue;
+        if (found) return std::nullopt;
+        found = place_in(pragma, static_cast<std::size_t>(&*part.begin() - pragma.text.data()));
+        found->column = 0;
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace plchost
