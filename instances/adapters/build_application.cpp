@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/stat.h>
 
 #include "instances/adapters/build_context.hpp"
@@ -108,16 +109,31 @@ class Build {
   }
 
   bool is_one_configuration() {
-    if (context_.project.configurations.size() != 1) {
-      context_.fail(fmt::format(
-          "the sources have {} CONFIGURATIONs; an application has one, which says what its tasks are",
-          context_.project.configurations.size()));
+    const auto& all = context_.project.configurations;
+    if (all.empty()) {
+      context_.fail(
+          {{context_.sources.front().file, 0, 0},
+           fmt::format("there is no CONFIGURATION in {}; an application has one, which says what its "
+                       "tasks are",
+                       names_of_sources())});
+    } else if (all.size() != 1) {
+      context_.fail(
+          {all[1].place, fmt::format("the sources have {} CONFIGURATIONs, of which the first one is {}; "
+                                     "an application has one",
+                                     all.size(), all[0].name)});
     } else if (configuration().resources.empty()) {
       context_.fail({configuration().place, "this CONFIGURATION runs no program"});
     }
     if (context_.good()) read_task_file();
     if (context_.good()) projects_.add_events(context_.project.configurations.front());
     return context_.good();
+  }
+  [[nodiscard]] std::string names_of_sources() const {
+    if (context_.sources.size() == 1) return "this file";
+    constexpr std::ptrdiff_t kShown = 10;
+    const auto names =
+        context_.sources | std::views::take(kShown) | std::views::transform(&iec::Source::file);
+    return fmt::format("{}{}", fmt::join(names, ", "), std::ssize(context_.sources) > kShown ? ", ..." : "");
   }
   void read_task_file() {
     std::string file = order_.tasks;

@@ -34,6 +34,12 @@ class MatiecTranslator : public Translator {
     context_.refuse_persistent(context_.project, "MATIEC");
     std::ranges::move(matiec::refused_words(context_.sources), std::back_inserter(context_.report.problems));
     std::ranges::move(matiec::refused_names(context_.project), std::back_inserter(context_.report.problems));
+    if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
+    // Errors of the sources count more than a configuration that is missing.
+    if (context_.good() && context_.project.configurations.empty() &&
+        matiec::find_compiler(context_.order.matiec)) {
+      (void)translate_sources();
+    }
     return context_.good();
   }
 
@@ -61,12 +67,6 @@ class MatiecTranslator : public Translator {
   }
 
  private:
-  [[nodiscard]] const iec::Configuration& configuration() const {
-    return context_.project.configurations.front();
-  }
-
-  // iec2c makes a file of each of these names. The files of the library are found by name, too.
-  void check_file_names() {
   bool translate_sources() {
     auto compiler = matiec::find_compiler(context_.order.matiec);
     auto words = context_.words_of("CC", "cc");
@@ -88,6 +88,12 @@ class MatiecTranslator : public Translator {
     return joined_->place(joined, 0);
   }
 
+  [[nodiscard]] const iec::Configuration& configuration() const {
+    return context_.project.configurations.front();
+  }
+
+  // iec2c makes a file of each of these names. The files of the library are found by name, too.
+  void check_file_names() {
     std::vector<std::string> names{"POUS", "LOCATED_VARIABLES", "IEC_STD_LIB", "ACCESSOR"};
     const auto check = [&](const char* kind, const std::string& given, const iec::SourcePlace& place) {
       const std::string name = iec::folded(given);
@@ -155,13 +161,13 @@ class MatiecTranslator : public Translator {
   BuildContext& context_;
   std::vector<iec::DebugPou> pous_;  // of a debug build
   matiec::Compiler compiler_;
+  std::optional<matiec::JoinedSource> joined_;
   std::vector<std::string> words_;
   std::vector<matiec::Located> located_;
 };
 
 }  // namespace
 
-  std::optional<matiec::JoinedSource> joined_;
 std::unique_ptr<Translator> make_matiec_translator(BuildContext& context) {
   return std::make_unique<MatiecTranslator>(context);
 }

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -174,6 +176,44 @@ CONFIGURATION c RESOURCE r ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); PROG
   EXPECT_THAT(said(path("other.so"), ""), HasSubstr("is one of the files that are read"));
   EXPECT_THAT(said(path("line.so"), path("")), HasSubstr("lies in the folder of --keep"));
   EXPECT_THAT(said(path("line.so"), ""), HasSubstr("there is no iec2c"));
+}
+
+TEST_F(BuildParts, SourcesWithoutAConfigurationAreNamed) {
+  const std::string one = put("one.st", "PROGRAM Main VAR a : INT; END_VAR a := ; END_PROGRAM\n");
+  const std::string two = put("two.st", "TYPE Mode : INT; END_TYPE\n");
+  const auto said = [&](std::vector<std::string> sources, const std::string& matiec) {
+    const BuildReport report = build_application({.sources = std::move(sources),
+                                                  .output = path("line.so"),
+                                                  .matiec = matiec,
+                                                  .adapters = "",
+                                                  .keep = "",
+                                                  .check_program = ""});
+    return report.problems.empty() ? "" : iec::describe(report.problems.front());
+  };
+  EXPECT_THAT(said({one}, "/nowhere"), HasSubstr(one + ": there is no CONFIGURATION in this file"));
+  EXPECT_THAT(said({one, two}, "/nowhere"), HasSubstr("there is no CONFIGURATION in " + one + ", " + two));
+
+  // A compiler that finds something says more.
+  fs::create_directories(path("matiec/lib/C"));
+  (void)put("matiec/lib/ieclib.txt", "");
+  (void)put("matiec/lib/C/iec_std_lib.h", "");
+  fs::permissions(put("matiec/iec2c", "#!/bin/sh\necho 'joined.st:1-40..1-40: error: wrong'\nexit 1\n"),
+                  fs::perms::owner_all);
+  EXPECT_EQ(said({one}, path("matiec")), one + ":1:40: wrong");
+}
+
+TEST_F(BuildParts, OfTwoConfigurationsTheSecondOneIsTold) {
+  const std::string source =
+      put("line.st", "CONFIGURATION a END_CONFIGURATION\nCONFIGURATION b END_CONFIGURATION\n");
+  const BuildReport report = build_application({.sources = {source},
+                                                .output = path("line.so"),
+                                                .matiec = "/nowhere",
+                                                .adapters = "",
+                                                .keep = "",
+                                                .check_program = ""});
+  ASSERT_FALSE(report.problems.empty());
+  EXPECT_THAT(iec::describe(report.problems.front()),
+              HasSubstr(source + ":2:1: the sources have 2 CONFIGURATIONs"));
 }
 
 }  // namespace
