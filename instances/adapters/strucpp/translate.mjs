@@ -24,11 +24,47 @@ function placeOf(node) {
   const span = node?.sourceSpan;
   return span === undefined ? [-1, 0, 0] : place(span.file, span.startLine, span.startCol);
 }
+function placeAt(number, offset) {
+  const before = sources[number].text.slice(0, offset);
+  return [number, before.split('\n').length, offset - before.lastIndexOf('\n')];
+}
+
+// Comments and texts become blanks: no other character moves.
+function withoutTexts(text) {
+  return text.replace(/\(\*[\s\S]*?\*\)|\/\*[\s\S]*?\*\/|\/\/[^\n]*|'(?:\$.|[^'$\n])*'/g, (part) => part.replace(/[^\n]/g, ' '));
+}
+
+// Where a global is declared.
+function placeOfGlobal(name) {
+  for (const [number, { text }] of sources.entries()) {
+    for (const section of withoutTexts(text).matchAll(/\bVAR_GLOBAL\b[\s\S]*?\bEND_VAR\b/gi)) {
+      const at = section[0].search(new RegExp(`\\b${name}\\b`, 'i'));
+      if (at >= 0) return placeAt(number, section.index + at);
+    }
+  }
+  return undefined;
+}
+
+// Some messages of the compiler have no line, and say in their text what they are about.
+function explained(found) {
+  const character = /^unexpected character: ->([\s\S]+)<- at offset: (\d+), skipped \d+ characters\.$/.exec(found.message);
+  if (character !== null) {
+    const number = fileNumbers.get(found.file ?? sources[0].name);
+    const offset = Number(character[2]);
+    // An instruction list was rewritten before: the offset is then none of the source.
+    if (sources[number]?.text.startsWith(character[1], offset)) return { place: placeAt(number, offset), text: `unexpected character '${character[1]}'` };
+  }
+  const global = /^Shared global '(\w+)' /.exec(found.message);
+  const place = global === null ? undefined : placeOfGlobal(global[1]);
+  return place === undefined ? undefined : { place, text: found.message };
+}
+
 function message(found) {
+  const known = found.line > 0 ? undefined : explained(found);
   const hint = found.suggestion === undefined ? '' : ` ${found.suggestion}`;
   // A message of several lines is told as one.
-  const text = `${found.message}${hint}`.replace(/[\0-\x1f\x7f]+/g, ' ').slice(0, 1000);
-  return { place: place(found.file ?? sources[0].name, found.line, found.column), text };
+  const text = `${known?.text ?? found.message}${hint}`.replace(/[\0-\x1f\x7f]+/g, ' ').slice(0, 1000);
+  return { place: known?.place ?? place(found.file ?? sources[0].name, found.line, found.column), text };
 }
 
 // A POU of the program and one of a library with the same name would both go into the C++. That of the program counts.

@@ -1,5 +1,6 @@
 // The parts of a build that touch files and other programs.
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -214,6 +215,56 @@ TEST_F(BuildParts, OfTwoConfigurationsTheSecondOneIsTold) {
   ASSERT_FALSE(report.problems.empty());
   EXPECT_THAT(iec::describe(report.problems.front()),
               HasSubstr(source + ":2:1: the sources have 2 CONFIGURATIONs"));
+}
+
+// Stands in for STruC++: it says what STruC++ says.
+class TranslatedByStrucpp : public BuildParts {
+ protected:
+  TranslatedByStrucpp() {
+    fs::create_directories(path("strucpp/dist/node"));
+    fs::create_directories(path("strucpp/libs"));
+    fs::create_directories(path("strucpp/src/runtime/include"));
+    (void)put("strucpp/src/runtime/include/iec_std_lib.hpp", "");
+  }
+  void SetUp() override {
+    if (std::system("node --version >/dev/null 2>&1") != 0)  // NOLINT(concurrency-mt-unsafe): one thread here
+      GTEST_SKIP() << "needs node";
+  }
+  std::string said(std::vector<std::string> sources, const std::string& body_of_compile) {
+    (void)put("strucpp/dist/node/index.js",
+              "exports.discoverStlibs = () => [];\nexports.compile = (source, options) => {" +
+                  body_of_compile + "};\n");
+    const BuildReport report = build_application({.sources = std::move(sources),
+                                                  .output = path("line.so"),
+                                                  .compiler = "strucpp",
+                                                  .matiec = "",
+                                                  .strucpp = path("strucpp"),
+                                                  .adapters = ADAPTERS,
+                                                  .keep = "",
+                                                  .check_program = ""});
+    return report.problems.empty() ? "" : iec::describe(report.problems.front());
+  }
+};
+
+TEST_F(TranslatedByStrucpp, ACharacterThatIsNotExpectedIsToldAtItsPlace) {
+  const std::string one = put("one.st", "TYPE\nEND_TYPE\n");
+  const std::string two = put("two.st", "\n\n  a := @;\n");
+  const auto errors = [](const std::string& file, int offset) {
+    return "return {success: false, warnings: [], errors: [{message: 'unexpected character: ->@<- at "
+           "offset: " +
+           std::to_string(offset) + ", skipped 1 characters.', line: 0, column: 0, file: '" + file + "'}]};";
+  };
+  EXPECT_EQ(said({one, two}, errors(two, 9)), two + ":3:8: unexpected character '@'");
+  EXPECT_THAT(said({one, two}, errors(two, 3)), HasSubstr(two + ": unexpected character: ->@<-"))
+      << "the offset is none of the source";
+}
+
+TEST_F(TranslatedByStrucpp, AGlobalFunctionBlockIsToldWhereItIsDeclared) {
+  const std::string one = put("one.st", "PROGRAM p\nVAR_EXTERNAL gf : fb; END_VAR\ngf();\nEND_PROGRAM\n");
+  const std::string two = put(
+      "two.st", "CONFIGURATION c\nVAR_GLOBAL (* gf *)\n  n : INT; gf : fb;\nEND_VAR\nEND_CONFIGURATION\n");
+  EXPECT_EQ(said({one, two}, "throw new Error(\"Shared global 'GF' is a function-block instance\");"),
+            two + ":3:12: Shared global 'GF' is a function-block instance");
 }
 
 }  // namespace
