@@ -194,9 +194,11 @@ class Build {
     const auto end =
         context_.run("the check by plc-instance", {order_.check_program, "--check-application", made},
                      order_.translate_limit);
-    if (end && !end->success())
-      context_.fail("plc-instance refuses the application:" + first_lines(end->output));
-    return end && end->success();
+    if (!end || end->success()) return end.has_value();
+    for (iec::SourceProblem& problem : pragmas_with(undefined_symbol(end->output), context_.sources))
+      context_.fail(std::move(problem));
+    if (context_.good()) context_.fail("plc-instance refuses the application:" + first_lines(end->output));
+    return false;
   }
 
   [[nodiscard]] fs::path output_of(const iec::Resource& resource) const {

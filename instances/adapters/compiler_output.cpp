@@ -1,6 +1,7 @@
 #include "instances/adapters/compiler_output.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstddef>
 #include <ranges>
@@ -96,6 +97,19 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(0, text.find_last_not_of(kBlanks) + 1);
 }
 
+bool is_of_name(char c) noexcept {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+}
+
+/// The place of this name as a whole word.
+std::size_t find_word(std::string_view text, std::string_view name) {
+  for (std::size_t at = text.find(name); at != std::string_view::npos; at = text.find(name, at + 1)) {
+    const std::size_t end = at + name.size();
+    if ((at == 0 || !is_of_name(text[at - 1])) && (end == text.size() || !is_of_name(text[end]))) return at;
+  }
+  return std::string_view::npos;
+}
+
 /// Of a byte of the token.
 iec::SourcePlace place_in(const iec::Token& token, std::size_t offset) {
   iec::SourcePlace place = token.place;
@@ -139,6 +153,28 @@ std::string_view from_first_error(std::string_view output) {
     begin = end + 1;
   }
   return output;
+}
+
+std::string undefined_symbol(std::string_view output) {
+  constexpr std::string_view kBegin = "undefined symbol: ";
+  const std::size_t at = output.find(kBegin);
+  if (at == std::string_view::npos) return "";
+  const std::string_view rest = output.substr(at + kBegin.size());
+  return {rest.begin(), std::ranges::find_if_not(rest, is_of_name)};
+}
+
+iec::SourceProblems pragmas_with(std::string_view name, std::span<const iec::Source> sources) {
+  iec::SourceProblems problems;
+  if (name.empty()) return problems;
+  for (const iec::Source& source : sources) {
+    for (const iec::Token& pragma : pragmas_in(source)) {
+      const std::size_t at = find_word(pragma.text, name);
+      if (at == std::string_view::npos) continue;
+      problems.push_back({place_in(pragma, at),
+                          fmt::format("the C in this pragma uses {}, which plchost does not have", name)});
+    }
+  }
+  return problems;
 }
 
 std::optional<iec::SourcePlace> place_in_pragma(std::string_view line_of_c,

@@ -22,6 +22,12 @@ using FindSource = std::function<std::optional<iec::SourcePlace>(const std::stri
 /// The lines of its output from the first error on: without the files that include each other.
 [[nodiscard]] std::string_view from_first_error(std::string_view output);
 
+/// The symbol that the loader has not found, by its message; empty: it says something else.
+[[nodiscard]] std::string undefined_symbol(std::string_view output);
+
+/// The pragmas with C that use this name. One problem for each.
+[[nodiscard]] iec::SourceProblems pragmas_with(std::string_view name, std::span<const iec::Source> sources);
+
 /// Where this line of C stands in a pragma: iec2c copies it as it is. Nothing: in none, or in several places.
 [[nodiscard]] std::optional<iec::SourcePlace> place_in_pragma(std::string_view line_of_c,
                                                               std::span<const iec::Source> sources);

@@ -63,6 +63,15 @@ const std::vector<iec::Source> kSources{{"a.st",
                                          "(* __tick *) {{ x(); }}\nEND_PROGRAM"},
                                         {"b.st", "{ __ticks = 1; }\n{ x(); }"}};
 
+TEST(OutputOfTheLoader, NamesASymbolThatAPragmaUses) {
+  const std::string output = "/tmp/line.so cannot be loaded: /tmp/line.so: undefined symbol: __tick\n";
+  EXPECT_EQ(undefined_symbol(output), "__tick");
+  EXPECT_EQ(undefined_symbol("other"), "");
+  EXPECT_THAT(described(pragmas_with(undefined_symbol(output), kSources)),
+              ElementsAre("a.st:2:25: the C in this pragma uses __tick, which plchost does not have"));
+  EXPECT_THAT(pragmas_with("", kSources), IsEmpty());
+}
+
 TEST(LineOfC, IsFoundInItsPragma) {
   EXPECT_EQ(place_in_pragma("   count = __tick;", kSources), (iec::SourcePlace{"a.st", 3, 0}));
   EXPECT_EQ(place_in_pragma("extern unsigned long __tick;", kSources), (iec::SourcePlace{"a.st", 2, 0}));
