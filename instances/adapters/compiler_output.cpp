@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/tokens.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -20,6 +21,7 @@ constexpr std::string_view kError = "error: ";
 constexpr std::string_view kNeeds = "required from";
 constexpr std::string_view kExpands = "note: in expansion of macro";
 constexpr std::size_t kMostProblems = 20;
+constexpr std::string_view kBlanks = " \t\r";
 
 /// FILE:LINE:COLUMN: REST, or FILE:LINE: REST.
 struct Line {
@@ -90,12 +92,6 @@ class ErrorReader {
   std::optional<iec::SourcePlace> needed_by_;  // of the template of which an error follows
   std::string unplaced_;                       // an error whose place may follow
 };
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
-}
 
 bool is_of_name(char c) noexcept {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
@@ -180,12 +176,12 @@ iec::SourceProblems pragmas_with(std::string_view name, std::span<const iec::Sou
 std::optional<iec::SourcePlace> place_in_pragma(std::string_view line_of_c,
                                                 std::span<const iec::Source> sources) {
   std::optional<iec::SourcePlace> found;
-  const std::string_view wanted = trimmed(line_of_c);
+  const std::string_view wanted = trimmed(line_of_c, kBlanks);
   if (wanted.empty()) return found;
   for (const iec::Source& source : sources) {
     for (const iec::Token& pragma : pragmas_in(source)) {
       for (const auto part : std::views::split(code_in(pragma), '\n')) {
-        if (trimmed(std::string_view(part.begin(), part.end())) != wanted) continue;
+        if (trimmed(std::string_view(part.begin(), part.end()), kBlanks) != wanted) continue;
         if (found) return std::nullopt;
         found = place_in(pragma, static_cast<std::size_t>(&*part.begin() - pragma.text.data()));
         found->column = 0;
