@@ -28,6 +28,14 @@ Result<nlohmann::json> parsed(std::string_view text) {
   return *std::move(json);
 }
 
+// Whole arrays are shown as "Line.temperature[]", and asked for without the brackets.
+std::string asked_name(std::string name) {
+  constexpr std::string_view kBrackets = "[]";
+  for (std::size_t at = name.find(kBrackets); at != std::string::npos; at = name.find(kBrackets))
+    name.erase(at, kBrackets.size());
+  return name;
+}
+
 }  // namespace
 
 DebugRequests debug_requests(CliSession& session, const std::string& host, const std::string& instance) {
@@ -121,7 +129,8 @@ Result<std::vector<plc_VariableRecord>> DebugLink::variables(const std::string& 
   return all;
 }
 
-Result<plc_VariableRecord> DebugLink::variable(const std::string& instance, const std::string& name) {
+Result<plc_VariableRecord> DebugLink::variable(const std::string& instance, const std::string& shown_name) {
+  const std::string name = asked_name(shown_name);
   if (!instance.empty()) {
     auto own = variables(fmt::format("{}.{}", instance, name));
     if (own && own->size() == 1) return own->front();

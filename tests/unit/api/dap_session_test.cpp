@@ -99,6 +99,12 @@ TEST_F(DapSessionTest, GivesPlainValuesOfVariablesThatAreNotForced) {
   EXPECT_EQ(result("n", "hover"), "2");
 }
 
+TEST_F(DapSessionTest, FindsAnArrayByTheNameThatItShows) {
+  const json body = ask("variables", {{"variablesReference", kInnermost}});
+  EXPECT_EQ(result(body["variables"][2]["evaluateName"], "watch"), "[3, 4]");
+  EXPECT_EQ(result("t[]", "watch"), "[3, 4]");
+}
+
 TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
   const json frames = ask("stackTrace", {{"threadId", 1}})["stackFrames"];
   ASSERT_EQ(frames.size(), 3U);

@@ -72,14 +72,14 @@ struct DebuggedInstance {
     return std::string(R"({"id":1,"line":7})");
   }
 
-  // "PATH.*", or a whole name.
+  // "PATH.*", or a whole name; that of an array is without its brackets.
   Result<VariableListing> list(std::string_view pattern) {
     const bool all = pattern.ends_with('*');
     if (all) pattern.remove_suffix(1);
     VariableListing page;
     std::ranges::copy_if(variables, std::back_inserter(page.variables), [&](const auto& variable) {
       const std::string_view name = dds::text_of(variable.name);
-      return all ? name.starts_with(pattern) : name == pattern;
+      return all ? name.starts_with(pattern) : name.substr(0, name.find('[')) == pattern;
     });
     if (page.variables.empty())
       return failure(ErrorCode::not_found, fmt::format("no variable '{}'", pattern));
