@@ -8,8 +8,8 @@ a built source tree. Without them nothing is proven, and the exit code is 77.
 Each source gets a CONFIGURATION of one task of 10 ms. For each one:
 build   plcctl makes an application, which plc-instance checks
 run     plc-instance runs it for a second: no exception, and it ends by SIGTERM
-runner  the values after each cycle are those of STruC++'s own runner
-both    the values after each cycle are those of the application of the other compiler
+runner  the values after each cycle are those of STruC++'s own runner, of the variables of programs whose values that shows
+both    the values after each cycle are those of the application of the other compiler, of all variables that both declare
 The exit code is 1 if a program of STruC++ is not built, does not run, or has another value than its runner.
 """
 
@@ -25,8 +25,12 @@ import tempfile
 
 TICK_NS = 10_000_000
 HERE = pathlib.Path(__file__).resolve().parent
-INTEGERS = {"SINT": "b", "USINT": "B", "INT": "h", "UINT": "H", "DINT": "i", "UDINT": "I", "LINT": "q", "ULINT": "Q",
-            "BYTE": "B", "WORD": "H", "DWORD": "I", "LWORD": "Q"}
+INTEGERS = ("SINT", "USINT", "INT", "UINT", "DINT", "UDINT", "LINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD")
+NS_OF_A_DAY = 86_400_000_000_000
+# As instances/plc_variables.h numbers and lays out the types.
+BOOL, STRING, COUNTED_STRING, SIZED_STRING, DAYS_DATE = 1, 20, 25, 26, 27
+PLAIN = {2: "b", 3: "h", 4: "i", 5: "q", 6: "B", 7: "H", 8: "I", 9: "Q", 10: "B", 11: "H", 12: "I", 13: "Q", 14: "f", 15: "d",
+         16: "q", 17: "q", 18: "q", 19: "q"}
 
 
 def sources_of(strucpp):
@@ -67,22 +71,41 @@ def build(options, source, compiler, folder):
     return (application, "") if done.returncode == 0 else (None, errors[0] if errors else "no reason is told")
 
 
+def decoded(kind, value):
+    """An element as a number, a truth or a text, the same in all layouts of compilers; None: of another type."""
+    if kind == BOOL:
+        return value[0] != 0
+    if kind in PLAIN:
+        return struct.unpack("<" + PLAIN[kind], value)[0]
+    if kind == DAYS_DATE:
+        return struct.unpack("<q", value)[0] * NS_OF_A_DAY
+    if kind == COUNTED_STRING:
+        return value[1:1 + value[0]].decode("latin-1")
+    if kind in (STRING, SIZED_STRING):
+        return value.split(b"\0")[0].decode("latin-1")
+    if len(value) == 16:
+        seconds, nanoseconds = struct.unpack("<qq", value)
+        return seconds * 1_000_000_000 + nanoseconds
+    return None
+
+
 def values_by_cycle(step, application, cycles):
+    """After each cycle: {name in lower case: its elements}; or None, and why not."""
     done = call([step, application, cycles, TICK_NS], application.parent, limit=60)
     if done.returncode != 0:
         return None, (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
     result = []
     for line in done.stdout.splitlines():
-        if line.startswith("cycle "):
+        name, kind, *elements = line.split()
+        if not elements:  # "cycle 1"
             result.append({})
-        elif " " in line:
-            name, value = line.split(" ", 1)
-            result[-1][name] = bytes.fromhex(value)
+        else:
+            result[-1][name.lower()] = [decoded(int(kind), bytes.fromhex(element)) for element in elements]
     return result, ""
 
 
 def runner_values(strucpp, source, folder, cycles):
-    """Of STruC++'s runner, after each cycle: {name: (type, text)}."""
+    """Of STruC++'s runner, after each cycle: {name: its one element}."""
     made = call(["node", strucpp / "dist/node/cli.js", source.name, "-o", "runner.cpp", "--build", "--cxx-flags", "-O0"], folder)
     if made.returncode != 0 or not (folder / "runner").exists():
         return None
@@ -93,26 +116,8 @@ def runner_values(strucpp, source, folder, cycles):
         if line.startswith("Executed "):
             result.append({})
         elif result and (found := re.match(r"(\w+\.\w+) : (\w+) = (.*)$", line)):
-            result[-1][found[1]] = (found[2], found[3])
+            result[-1][found[1].lower()] = [shown(found[3], found[2])]
     return result
-
-
-def decoded(value, kind, compiler):
-    """The value of an elementary type; None: of another one."""
-    if kind == "BOOL":
-        return value[0] != 0
-    if kind in INTEGERS:
-        return struct.unpack_from("<" + INTEGERS[kind], value)[0]
-    if kind == "REAL":
-        return struct.unpack_from("<f", value)[0]
-    if kind == "LREAL":
-        return struct.unpack_from("<d", value)[0]
-    if kind == "TIME":
-        if compiler == "matiec":
-            seconds, nanoseconds = struct.unpack_from("<qq", value)
-            return seconds * 1_000_000_000 + nanoseconds
-        return struct.unpack_from("<q", value)[0]
-    return None
 
 
 def shown(text, kind):
@@ -124,33 +129,34 @@ def shown(text, kind):
     if kind in ("REAL", "LREAL"):
         return float(text)
     if kind == "TIME":
-        units = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
+        units = {"d": NS_OF_A_DAY, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
         sign = -1 if "-" in text else 1
         return sign * round(sum(float(number) * units[unit] for number, unit in re.findall(r"([\d.]+)(ms|us|ns|d|h|m|s)", text)))
     return None
 
 
-def same(one, other, kind):
-    if kind in ("REAL", "LREAL"):
+def same(one, other):
+    if isinstance(one, float):
         return one == other or (one != one and other != other) or abs(one - other) <= 1e-5 * max(abs(one), abs(other))
     return one == other
 
 
-def compare(mine, others, other_value):
+def compare(mine, others):
     """(values that are the same, the first difference of each variable)."""
     count, different = 0, {}
     for cycle, (values, expected) in enumerate(zip(mine, others), 1):
-        for name, what in expected.items():
-            if name not in values:
+        for name in values.keys() & expected.keys():
+            if None in values[name] or None in expected[name]:
                 continue
-            kind, one, other = other_value(name, values[name], what)
-            if one is None or other is None:
-                continue
-            if same(one, other, kind):
-                count += 1
+            if len(values[name]) == len(expected[name]) and all(map(same, values[name], expected[name])):
+                count += len(values[name])
             else:
-                different.setdefault(name, f"{name} is {one}, not {other} (cycle {cycle})")
-    return count, list(different.values())
+                different.setdefault(name, f"{name} is {listed(values[name])}, not {listed(expected[name])} (cycle {cycle})")
+    return count, [different[name] for name in sorted(different)]
+
+
+def listed(elements):
+    return ", ".join(map(str, elements))
 
 
 def told(count, different):
@@ -198,15 +204,11 @@ class Proof:
         if values["strucpp"] and not self.options.without_runner:
             runner = runner_values(self.strucpp, source, folder, self.options.cycles)
         if runner:
-            count, different = compare(values["strucpp"], runner, lambda _, mine, what: (what[0], decoded(mine, what[0], "strucpp"), shown(what[1], what[0])))
+            count, different = compare(values["strucpp"], runner)
             row["runner"] = told(count, different)
             self.failed += len(different) > 0
-        if runner and values["matiec"]:
-            kinds = {name: what[0] for name, what in runner[0].items()}
-            expected = [{name: value for name, value in cycle.items() if name in kinds} for cycle in values["matiec"]]
-            count, different = compare(values["strucpp"], expected, lambda name, mine, other: (
-                kinds[name], decoded(mine, kinds[name], "strucpp"), decoded(other, kinds[name], "matiec")))
-            row["both"] = told(count, different)
+        if values["strucpp"] and values["matiec"]:
+            row["both"] = told(*compare(values["strucpp"], values["matiec"]))
         self.failed += row["strucpp"] != "" or row["run"] != ""
         return row
 
@@ -235,7 +237,7 @@ def main():
     strucpp = pathlib.Path(folders["PLCHOST_STRUCPP"]).resolve()
     with tempfile.TemporaryDirectory(prefix="plchost-proof.") as base:
         step = pathlib.Path(base) / "step_application"
-        subprocess.run(["cc", "-O1", "-rdynamic", f"-I{HERE.parent.parent / 'instances'}", HERE / "step_application.c", "-ldl", "-o", step], check=True)
+        subprocess.run(["cc", "-std=gnu2x", "-O1", "-rdynamic", f"-I{HERE.parent.parent / 'instances'}", HERE / "step_application.c", "-ldl", "-o", step], check=True)
         proof = Proof(options, strucpp, step)
         table = []
         for number, path in enumerate(sources_of(strucpp)):
