@@ -39,7 +39,7 @@ install(FILES ${CMAKE_BINARY_DIR}/plchostConfig.cmake ${CMAKE_BINARY_DIR}/plchos
 
 # The documents, and what they link to, in the folders in which they link to it.
 file(GLOB_RECURSE documents RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS *.md *.svg
-  instances/examples/*.c instances/examples/*.cpp instances/examples/*.hpp instances/examples/*.cfg
+  instances/debugging/vscode/*.json instances/examples/*.c instances/examples/*.cpp instances/examples/*.hpp instances/examples/*.cfg
   instances/examples/*.py instances/examples/*.st instances/examples/*.toml api/library/examples/*.cpp api/library/examples/*.py)
 foreach(document ${documents})
   if(document MATCHES "^(manager|schedulers|instances|shm|api|tests)/|^README.md$")

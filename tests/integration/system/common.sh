@@ -135,6 +135,16 @@ undisturbed() {
   [ $((10 * (lost - $3))) -le $((cycles - $2)) ] || fail "$1 has lost $((lost - $3)) cycles beside $((cycles - $2))"
 }
 
+# serve_dap INSTANCE: sets `port` to where a client of the Debug Adapter Protocol finds it
+serve_dap() {
+  local said=$cell/dap-$1.txt
+  "$BIN/plcctl" --timeout 10 debug "$1" --dap 0 >"$said" 2>"$cell/dap-$1.log" &
+  others+=($!)
+  has_port() { grep -qE '127.0.0.1:[0-9]+' "$said"; }
+  until_true 20 has_port
+  port=$(grep -oE '127.0.0.1:[0-9]+' "$said" | cut -d: -f2)
+}
+
 # refused TEXT COMMAND...: the command fails with exit code 1 and says TEXT
 refused() {
   local text=$1 output code=0

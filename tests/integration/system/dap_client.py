@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""A client of the Debug Adapter Protocol for debugging_over_dap.sh: dap_client.py PORT story|garbage|vanish"""
+"""A client of the Debug Adapter Protocol for the stories: dap_client.py PORT story|garbage|vanish, PORT vscode PACKAGE_JSON,
+or PORT text SOURCE"""
 import json
 import socket
 import sys
@@ -132,11 +133,72 @@ def garbage(port):
             pass
 
 
-def all_halt(port):
-    client = attached(port, haltAllTasks=True)
+def launch_configuration(package):
+    """That of the extension for VS Code, with each switch on. VS Code sends all of it as the arguments of its request."""
+    with open(package, encoding="utf-8") as file:
+        contributed = json.load(file)["contributes"]
+    (debugger,) = contributed["debuggers"]
+    (configuration,) = debugger["initialConfigurations"]
+    assert debugger["configurationSnippets"][0]["body"] == configuration, debugger
+    assert debugger["type"] == configuration["type"] == "plchost" and debugger["label"], debugger
+    assert not {"program", "runtime"} & set(debugger), "the protocol is served by plcctl"
+    assert {".st"} == {suffix for language in contributed["languages"] for suffix in language["extensions"]}, contributed
+    assert debugger["languages"] == [one["language"] for one in contributed["breakpoints"]], contributed
+    assert {one["id"] for one in contributed["languages"]} <= set(debugger["languages"]), contributed
+    ((request, attributes),) = debugger["configurationAttributes"].items()
+    assert configuration["request"] == request == "attach", configuration
+    described = attributes["properties"]
+    assert set(described) == {"debugServer", "haltAllTasks"} == set(configuration) - {"name", "type", "request"}, configuration
+    assert all(configuration[name] == one["default"] for name, one in described.items()), configuration
+    assert isinstance(configuration["debugServer"], int), "VS Code connects to a number only"
+    return configuration | {name: True for name, one in described.items() if one["type"] == "boolean"}
+
+
+def vscode(port, package):
+    """A breakpoint halts all tasks."""
+    client = attached(port, **launch_configuration(package))
     client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Twice"}])
     halts = [client.event("stopped"), client.event("stopped")]
     assert sorted(one["reason"] for one in halts) == ["breakpoint", "pause"], halts
+    client.ask("disconnect")
+
+
+def text(port, source):
+    """On the Structured Text of debugging_of_structured_text.sh."""
+    client = attached(port)
+    made = client.ask("setBreakpoints", source={"path": source}, breakpoints=[{"line": 11, "condition": "n > 3"}, {"line": 900}])["breakpoints"]
+    assert made[0]["verified"] and made[0]["line"] == 12 and not made[1]["verified"], made
+    client.ask("configurationDone")
+    threads = {one["name"]: one["id"] for one in client.ask("threads")["threads"]}
+    assert set(threads) == {"Main"}, threads
+    main = threads["Main"]
+    hit = client.event("stopped")
+    assert hit["reason"] == "breakpoint" and hit["threadId"] == main, hit
+    frames = stack(client, main)
+    assert [(one["name"].lower(), one["line"]) for one in frames] == [("counter", 12), ("press", 19)], frames
+    assert {one["source"]["path"] for one in frames} == {source}, frames  # an editor opens only a whole path
+
+    scope = client.ask("scopes", frameId=frames[0]["id"])["scopes"][0]
+    values = {one["name"].lower(): one for one in client.ask("variables", variablesReference=scope["variablesReference"])["variables"]}
+    assert {"n", "inc"} <= set(values) and values["inc"]["value"] == "1", values
+    changed = client.ask("setVariable", variablesReference=scope["variablesReference"], name=values["n"]["name"], value="1000")
+    assert changed["value"] == "1000", changed
+    assert client.ask("evaluate", expression="n", frameId=frames[0]["id"])["result"] == "1000"
+
+    client.ask("stepOut", threadId=main)
+    assert client.event("stopped")["reason"] == "step"
+    frames = stack(client, main)
+    assert [(one["name"].lower(), one["line"]) for one in frames] == [("press", 20)], frames
+    assert client.ask("evaluate", expression="press1.one.n")["result"] == "1001"
+    client.ask("stepIn", threadId=main)
+    client.event("stopped")
+    assert [one["name"].lower() for one in stack(client, main)] == ["twice", "press"]
+    client.ask("stepOut", threadId=main)
+    client.event("stopped")
+    client.ask("next", threadId=main)
+    client.event("stopped")
+    assert client.ask("evaluate", expression="press1.doubled")["result"] == "2002"
+    client.ask("setBreakpoints", source={"path": source}, breakpoints=[])
     client.ask("disconnect")
 
 
@@ -147,4 +209,4 @@ def vanish(port):
     client.socket.close()
 
 
-{"story": story, "garbage": garbage, "all_halt": all_halt, "vanish": vanish}[sys.argv[2]](int(sys.argv[1]))
+{"story": story, "garbage": garbage, "vanish": vanish, "vscode": vscode, "text": text}[sys.argv[2]](int(sys.argv[1]), *sys.argv[3:])

@@ -30,11 +30,7 @@ refused "no POU" plcctl debug line1 'break Nothing:3'
 refused "'help' lists them" plcctl debug line1 dance
 
 echo "- one engineer's story over the Debug Adapter Protocol"
-"$BIN/plcctl" --timeout 10 debug line1 --dap 0 >"$cell/dap.txt" 2>"$cell/dap.log" &
-others+=($!)
-has_port() { grep -qE '127.0.0.1:[0-9]+' "$cell/dap.txt"; }
-until_true 20 has_port
-port=$(grep -oE '127.0.0.1:[0-9]+' "$cell/dap.txt" | cut -d: -f2)
+serve_dap line1
 story() { python3 "$(dirname "$0")/dap_client.py" "$port" story || fail "the story over DAP"; }
 costs_no_cycle line2/Fill story
 until_true 10 runs_on
@@ -43,8 +39,10 @@ echo "- garbage on the port ends that connection, and nothing else"
 python3 "$(dirname "$0")/dap_client.py" "$port" garbage || fail "garbage"
 python3 "$(dirname "$0")/dap_client.py" "$port" story || fail "the story after garbage"
 
-echo "- a client whose breakpoint halts all tasks"
-python3 "$(dirname "$0")/dap_client.py" "$port" all_halt || fail "all_halt"
+echo "- VS Code with its extension: a breakpoint halts all tasks"
+extension=$(dirname "$0")/../../../instances/debugging/vscode/package.json
+is "$(jq -r .version "$extension")" "$("$BIN/plcctl" --version)" || fail "the extension has another version than plcctl"
+python3 "$(dirname "$0")/dap_client.py" "$port" vscode "$extension" || fail "vscode"
 until_true 10 runs_on
 
 echo "- a client that vanishes: its breakpoints go, and the task goes on"
