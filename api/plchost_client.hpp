@@ -129,6 +129,20 @@ class PLCHOST_CLIENT_API Client {
     std::vector<Variable> variables;
   };
 
+  /// A variable that is forced.
+  struct Force : Variable {
+    std::string host;
+    std::string instance;
+  };
+
+  /// A sample of a watch of variables, or why there is none.
+  struct Sampled {
+    int code = 0;      ///< 0: there is one; else ClientError::Code
+    std::string text;  ///< why there is none
+    Sample sample;
+    explicit operator bool() const noexcept { return code == 0; }
+  };
+
   /// The clock of a host, as seen from here.
   struct Clock {
     std::chrono::nanoseconds offset{};  ///< of the host's CLOCK_REALTIME: positive: ahead of the one here
@@ -254,6 +268,9 @@ class PLCHOST_CLIENT_API Client {
   /// The same, with their values of one moment. ClientError: full: they are more than 1024, or some 200 kB.
   Sample sample(const std::string& host, const std::string& instance,
                 const std::vector<std::string>& patterns);
+  /// The variables of a host that are forced, with the values that they are forced to; of an array, each
+  /// element that is. Empty instance: of all. ClientError: not_found: no such instance.
+  std::vector<Force> forces(const std::string& host = {}, const std::string& instance = {});
   /// Asks the host for its time, several times: the best answer counts.
   Clock read_clock(const std::string& host = {});
   /// Has the host looked at anew. The result of each check, also of those that found nothing wrong.
@@ -317,6 +334,21 @@ class PLCHOST_CLIENT_API Client {
                             const std::string& scheduler);
   std::string register_event(const std::string& host, const std::string& event);
   std::string unregister_event(const std::string& host, const std::string& event);
+  /// Writes a variable, or an element of one ("Grid[1,2]"), once and between two cycles. `value`: as
+  /// Structured Text writes it: "5", "TRUE", "T#1s", "'text'". Returns the value before and after.
+  /// A name with '=', '*', '?' or a control character is an invalid_argument, and nothing is sent.
+  /// ClientError: invalid_argument: also a value that is not of the type; not_found: no such variable;
+  /// refused: it is read-only, or this takes another role.
+  std::string write_variable(const std::string& host, const std::string& instance, const std::string& name,
+                             const std::string& value);
+  /// The variable has this value at the begin and the end of each cycle, until it is unforced or the instance
+  /// is reset. Else as write_variable().
+  std::string force_variable(const std::string& host, const std::string& instance, const std::string& name,
+                             const std::string& value);
+  /// The variable keeps the value that it has. ClientError: wrong_state: it is not forced; else as above.
+  std::string unforce_variable(const std::string& host, const std::string& instance, const std::string& name);
+  /// Of all forced variables of the instance, also of none.
+  std::string unforce_all(const std::string& host, const std::string& instance);
   /// Has the host read its configuration file again. Instances that are unchanged run on. Returns a line for
   /// each change, with when it is used; "nothing has changed". ClientError: invalid_argument: the file has
   /// errors, a line each, and nothing is changed. Give the Client a timeout of 60 s if the file has many
@@ -350,16 +382,27 @@ class PLCHOST_CLIENT_API Client {
                      std::function<void(const Record&)> callback);
   /// For the last 64 of each instance, and each that comes. Empty host: of all.
   Watch watch_transitions(const std::string& host, std::function<void(const Transition&)> callback);
+  /// Samples the variables that match the patterns, as sample(), and calls back with each sample: a group of
+  /// one moment each time. `interval`: from one sample to the next, 10 ms to an hour. A sample whose time has
+  /// passed meanwhile is left out. If there is none, the reason is told once, and the watch goes on: the
+  /// host, the instance or the variable may come later. Calls and other watches hold up no sample, but the
+  /// callbacks of all watches of variables run one after the other. ClientError: invalid_argument: the
+  /// interval, or a pattern that can match nothing.
+  Watch watch_variables(const std::string& host, const std::string& instance,
+                        const std::vector<std::string>& patterns, std::chrono::milliseconds interval,
+                        std::function<void(const Sampled&)> callback);
 
  private:
   class Worker;
   class Watcher;
+  class LookingWatch;
   class HostsWatch;
   template <class TopicSample>
   class StatusWatch;
   class RecordsWatch;
   class TransitionsWatch;
-  Watch begin_watch(std::shared_ptr<Watch::Subscription> subscription);
+  class VariablesWatch;
+  Watch begin_watch(std::shared_ptr<LookingWatch> subscription);
   template <class TopicSample, class Item>
   Watch watch_items(const std::string& host, std::function<void(const Item&)> callback);
 

@@ -56,31 +56,6 @@ Async<Result<std::vector<Client::Route>>> list_routes(CallOrder& order, ClientCo
   co_return routes;
 }
 
-Async<Result<std::vector<Client::Variable>>> list_variables(CallOrder& order, ClientCore& core,
-                                                            std::string host, std::string instance,
-                                                            VariableQuery query) {
-  PLCHOST_CO_TRY_ASSIGN(const auto place, co_await order.place(core, host));
-  std::vector<Client::Variable> variables;
-  for (bool goes_on = true; goes_on;) {
-    PLCHOST_CO_TRY_ASSIGN(const auto page,
-                          co_await core.list_variables(place.host, instance, query, order.deadline()));
-    PLCHOST_CO_TRY_ASSIGN(goes_on, next_page(place.host, page, query));
-    for (const plc_VariableRecord& variable : page.variables) variables.push_back(to_public(variable));
-  }
-  co_return variables;
-}
-
-Async<Result<Client::Sample>> sample_of(CallOrder& order, ClientCore& core, std::string host,
-                                        std::string instance, VariableQuery query) {
-  PLCHOST_CO_TRY_ASSIGN(const auto place, co_await order.place(core, host));
-  PLCHOST_CO_TRY_ASSIGN(const auto page,
-                        co_await core.list_variables(place.host, instance, query, order.deadline()));
-  PLCHOST_CO_TRY(is_whole(page));
-  Client::Sample sample{.time = wall_time(page.time_unix_ns), .consistent = page.consistent, .variables = {}};
-  for (const plc_VariableRecord& variable : page.variables) sample.variables.push_back(to_public(variable));
-  co_return sample;
-}
-
 Async<Result<Client::Clock>> clock_of_host(CallOrder& order, ClientCore& core, std::string host) {
   PLCHOST_CO_TRY_ASSIGN(const auto place, co_await order.place(core, host));
   PLCHOST_CO_TRY_ASSIGN(const auto clock, co_await core.clock_offset(place.host, place.deadline));
@@ -114,20 +89,6 @@ std::vector<Client::Route> Client::routes(const std::string& host, const std::st
   const NodeQuery query{.base = base};
   return value_or_throw(worker_->run<std::vector<Route>>(
       [&](ClientCore& core) { return list_routes(worker_->order(), core, host, query); }));
-}
-
-std::vector<Client::Variable> Client::variables(const std::string& host, const std::string& instance,
-                                                const std::vector<std::string>& patterns) {
-  const VariableQuery query{.patterns = patterns};
-  return value_or_throw(worker_->run<std::vector<Variable>>(
-      [&](ClientCore& core) { return list_variables(worker_->order(), core, host, instance, query); }));
-}
-
-Client::Sample Client::sample(const std::string& host, const std::string& instance,
-                              const std::vector<std::string>& patterns) {
-  const VariableQuery query{.patterns = patterns};
-  return value_or_throw(worker_->run<Sample>(
-      [&](ClientCore& core) { return sample_of(worker_->order(), core, host, instance, query); }));
 }
 
 Client::Clock Client::read_clock(const std::string& host) {

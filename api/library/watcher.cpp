@@ -21,9 +21,9 @@ bool is_of_one(const TransitionView& a, const TransitionView& b) {
 
 }  // namespace
 
-void Client::Watch::Subscription::look(const News& news) {
+void Client::Watch::Subscription::unless_stopped(const std::function<void()>& call) {
   const std::lock_guard lock(calling_);
-  if (!stopped()) tell(news);
+  if (!stopped()) call();
 }
 
 void Client::Watch::Subscription::stop() noexcept {
@@ -38,6 +38,7 @@ void Client::Watcher::wake() {
 }
 
 void Client::Watcher::end() {
+  sampling_.end();
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -46,7 +47,7 @@ void Client::Watcher::end() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Client::Watcher::add(std::shared_ptr<Watch::Subscription> subscription) {
+void Client::Watcher::add(std::shared_ptr<LookingWatch> subscription) {
   const std::lock_guard lock(mutex_);
   if (ending_) return;
   subscriptions_.push_back(std::move(subscription));

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,6 +14,7 @@
 
 #include "api/library/connection.hpp"
 #include "api/library/maker_process.hpp"
+#include "api/library/sampling.hpp"
 
 namespace plchost {
 
@@ -31,15 +33,13 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
   Subscription(const Subscription&) = delete;
   Subscription& operator=(const Subscription&) = delete;
 
-  [[nodiscard]] virtual bool wants_transitions() const noexcept { return false; }
-  /// Watcher's thread.
-  void look(const News& news);
   /// No callback after this. Any thread.
   void stop() noexcept;
   [[nodiscard]] bool stopped() const noexcept { return stopped_.load(); }
 
  protected:
-  virtual void tell(const News& news) = 0;
+  /// Calls back by `call`, unless it was stopped. stop() waits for the end of that.
+  void unless_stopped(const std::function<void()>& call);
 
  private:
   MakerProcess maker_;
@@ -47,13 +47,26 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
   std::atomic<bool> stopped_{false};
 };
 
+/// One that a Watcher looks for.
+class __attribute__((visibility("hidden"))) Client::LookingWatch : public Client::Watch::Subscription {
+ public:
+  [[nodiscard]] virtual bool wants_transitions() const noexcept { return false; }
+  /// Watcher's thread.
+  void look(const News& news) {
+    unless_stopped([&] { tell(news); });
+  }
+
+ protected:
+  virtual void tell(const News& news) = 0;
+};
+
 /// Looks for what watches want to be told, on a thread and with a ControlClient of its own: a call that waits
 /// holds up no watch. The thread waits for DDS, and looks when something has changed.
 class __attribute__((visibility("hidden"))) Client::Watcher {
  public:
   /// `only`: as for ControlClient.
-  Watcher(std::shared_ptr<ParticipantSource> participant, std::string only)
-      : connection_(std::move(participant), std::move(only)) {}
+  Watcher(const std::shared_ptr<ParticipantSource>& participant, const std::string& only)
+      : connection_(participant, only), sampling_(participant, only) {}
   ~Watcher() { end(); }
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
@@ -61,10 +74,12 @@ class __attribute__((visibility("hidden"))) Client::Watcher {
   /// Nothing is told after this. Not from a callback.
   void end();
   /// Its thread starts with the first.
-  void add(std::shared_ptr<Watch::Subscription> subscription);
+  void add(std::shared_ptr<LookingWatch> subscription);
+  /// For the watches of variables.
+  [[nodiscard]] Sampling& sampling() noexcept { return sampling_; }
 
  private:
-  using Subscriptions = std::vector<std::shared_ptr<Watch::Subscription>>;
+  using Subscriptions = std::vector<std::shared_ptr<LookingWatch>>;
   void watch();
   /// Those that are there, once there are some. Nothing: it ends.
   [[nodiscard]] std::optional<Subscriptions> wait_for_live();
@@ -76,6 +91,7 @@ class __attribute__((visibility("hidden"))) Client::Watcher {
   void keep(const std::vector<TransitionView>& fresh);
 
   Connection connection_;
+  Sampling sampling_;
   std::mutex mutex_;
   std::condition_variable changed_;
   Subscriptions subscriptions_;

@@ -35,7 +35,7 @@ bool is_told(const Client::Host& before, Client::Host now) {
 
 }  // namespace
 
-class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Client::Watch::Subscription {
+class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Client::LookingWatch {
  public:
   explicit HostsWatch(std::function<void(const Host&)> callback) : callback_(std::move(callback)) {}
 
@@ -65,7 +65,7 @@ class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Cl
 
 /// Of one status topic.
 template <class TopicSample>
-class __attribute__((visibility("hidden"))) Client::StatusWatch final : public Client::Watch::Subscription {
+class __attribute__((visibility("hidden"))) Client::StatusWatch final : public Client::LookingWatch {
  public:
   using Item = decltype(to_public(TopicSample{}));
 
@@ -115,7 +115,7 @@ class __attribute__((visibility("hidden"))) Client::StatusWatch final : public C
 };
 
 /// Of any status topic, by its name.
-class __attribute__((visibility("hidden"))) Client::RecordsWatch final : public Client::Watch::Subscription {
+class __attribute__((visibility("hidden"))) Client::RecordsWatch final : public Client::LookingWatch {
  public:
   RecordsWatch(std::string topic, std::string host, std::function<void(const Record&)> callback)
       : topic_(std::move(topic)), host_(std::move(host)), callback_(std::move(callback)) {}
@@ -165,8 +165,7 @@ class __attribute__((visibility("hidden"))) Client::RecordsWatch final : public 
   std::map<std::string, std::map<Key, Record>> told_;  // by host
 };
 
-class __attribute__((visibility("hidden"))) Client::TransitionsWatch final
-    : public Client::Watch::Subscription {
+class __attribute__((visibility("hidden"))) Client::TransitionsWatch final : public Client::LookingWatch {
  public:
   TransitionsWatch(std::string host, std::function<void(const Transition&)> callback)
       : host_(std::move(host)), callback_(std::move(callback)) {}
@@ -207,7 +206,7 @@ void Client::Watch::stop() noexcept {
   if (const auto subscription = std::move(subscription_)) subscription->stop();
 }
 
-Client::Watch Client::begin_watch(std::shared_ptr<Watch::Subscription> subscription) {
+Client::Watch Client::begin_watch(std::shared_ptr<LookingWatch> subscription) {
   if (const auto ours = worker_->maker().check(); !ours) throw_client_error(ours.error());
   watcher_->add(subscription);
   return Watch(std::move(subscription));

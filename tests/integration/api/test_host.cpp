@@ -11,11 +11,13 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/transition_ring.hpp"
 #include "shm/sockets/packet_socket.hpp"
 #include "tests/support/interrupted_write.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/receive_until.hpp"
 
 namespace plchost {
 
@@ -154,6 +156,12 @@ ControlReply TestHost::check_host(const std::string& argument) {
   return {.number = 0, .code = ErrorCode::ok, .text = encode_part(checks_, findings_, first, kTinyPart)};
 }
 
+ControlReply TestHost::forward(const ControlRequest& request) const {
+  auto link = PacketSocket::connect(instance_socket_path(run_directory_, request.instance)).value();
+  link.send(encode(request)).value();
+  return decode_reply(receive_until(link, soon()).value()).value();
+}
+
 void TestHost::serve(const std::stop_token& stop) {
   auto listener = PacketListener::listen(run_directory_ + "/manager.sock").value();
   std::optional<PacketSocket> peer;
@@ -174,9 +182,12 @@ void TestHost::serve(const std::stop_token& stop) {
     if (request.verb == ControlVerb::check_host) {
       reply = check_host(request.argument);
     } else {
-      const std::lock_guard lock(mutex_);
-      requests_.push_back(request);
-      reply = answer_;
+      {
+        const std::lock_guard lock(mutex_);
+        requests_.push_back(request);
+        reply = answer_;
+      }
+      if (forwards) reply = forward(request);
     }
     if (silent) continue;
     while (hold && request.verb == ControlVerb::stop && !stop.stop_requested())

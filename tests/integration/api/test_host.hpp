@@ -78,6 +78,7 @@ class TestHost {
     const std::lock_guard lock(mutex_);
     return checks_;
   }
+  std::atomic<bool> forwards{false};    ///< the instance's own process answers for the manager
   std::atomic<bool> silent{false};      ///< the manager answers nothing
   std::atomic<bool> hold{false};        ///< the manager answers "stop" once this is false again
   std::atomic<bool> close_peer{false};  ///< the manager hangs up
@@ -85,6 +86,7 @@ class TestHost {
  private:
   void serve(const std::stop_token& stop);
   ControlReply check_host(const std::string& argument);
+  [[nodiscard]] ControlReply forward(const ControlRequest& request) const;
 
   std::uint32_t domain_;
   std::string name_;
