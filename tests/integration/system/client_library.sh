@@ -4,17 +4,21 @@
 source=$(cd "$(dirname "$0")/../../.." && pwd)
 
 write_host north "$first_core"
-write_instance north packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"'
+write_instance north packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"' 'share_core = true'
+write_instance north press1 "$first_core" line_variables 'share_core = true'
 start_manager north
 until_true 20 state_is packer1 running
+until_true 20 state_is press1 running
 
 echo "- installed: found by pkg-config and by CMake"
 cmake --install "$BIN/.." --component plchost-client --prefix "$cell/usr" >"$cell/install.log" || fail "not installed"
 library=$(dirname "$(find "$cell/usr" -name 'libplchost-client.so')")
 export PKG_CONFIG_PATH=$library/pkgconfig LD_LIBRARY_PATH=$library
-# shellcheck disable=SC2046  # flags are words
-g++ -std=c++17 -Wall -Wextra -Werror "$source/api/library/examples/post_event.cpp" -o "$cell/post_event" \
-  $(pkg-config --cflags --libs plchost-client) 2>"$cell/g++.log" || fail "not built by pkg-config"
+for example in hold_variable post_event; do
+  # shellcheck disable=SC2046  # flags are words
+  g++ -std=c++17 -Wall -Wextra -Werror "$source/api/library/examples/$example.cpp" -o "$cell/$example" \
+    $(pkg-config --cflags --libs plchost-client) 2>"$cell/g++.log" || fail "not built by pkg-config: $example"
+done
 mkdir "$cell/project"
 cat >"$cell/project/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.25)
@@ -33,6 +37,17 @@ if said=$("$cell/post_event" north packer1/nothing 2>&1); then fail "posted to n
 grep -q "packer1/nothing" <<<"$said" || fail "$said"
 if said=$("$cell/post_event" north nothing 2>&1); then fail "no event"; fi
 grep -q "'nothing' is not of the form INSTANCE/EVENT" <<<"$said" || fail "$said"
+
+echo "- a variable that is held at a value, and those that are watched meanwhile"
+"$cell/hold_variable" north press1 line.total 7 2 'line.*' 'fast.*' >"$cell/held.log" 2>&1 || fail "not held"
+grep -q "^forced: line.total to 7" "$cell/held.log" || fail "no force: $(cat "$cell/held.log")"
+grep -q "line.total=7 forced " "$cell/held.log" || fail "not watched: $(cat "$cell/held.log")"
+sed -nE '/of several cycles/d; s/.*fast.count=([0-9]+) fast.twice=([0-9]+) .*/\1 \2/p' "$cell/held.log" >"$cell/pairs.txt"
+awk '2 * $1 != $2 { exit 1 }' "$cell/pairs.txt" || fail "values of different cycles: $(cat "$cell/held.log")"
+[ "$(wc -l <"$cell/pairs.txt")" -ge 5 ] || fail "too few samples: $(cat "$cell/held.log")"
+is "$(plcctl list forces --json)" "[]" || fail "$(plcctl list forces)"
+if said=$("$cell/hold_variable" north press1 line.stopped TRUE 1 'line.*' 2>&1); then fail "it is read-only"; fi
+grep -q "'line.stopped': the application has declared it as read-only" <<<"$said" || fail "$said"
 
 echo "- Python"
 PYTHONPATH=$BIN/../python python3 "$source/api/library/examples/line.py" north packer1/product >"$cell/line.log" 2>&1 ||
@@ -81,6 +96,61 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
         assert error.code == 1, error
 EOF
 PYTHONPATH=$BIN/../python python3 "$cell/logs.py" || fail "logs and reload"
+
+echo "- Python writes, forces and watches variables"
+cat >"$cell/variables.py" <<'EOF'
+import os, threading, time, plchost_client
+def refused(code, call, *arguments):
+    try:
+        call(*arguments)
+    except plchost_client.ClientError as error:
+        assert error.code == code, error
+        return str(error)
+    raise AssertionError(f"{arguments} is not refused")
+with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
+    of = ("north", "press1")
+    def follows(name, value):
+        end = time.monotonic() + 20
+        while client.sample(*of, [name]).variables[0].value != value:
+            assert time.monotonic() < end, (name, value)
+    assert "20 -> 40" in client.write_variable(*of, "line.setpoint", "40")
+    follows("line.total", "41")
+    groups, enough, held = [], threading.Event(), threading.Event()
+    def on_group(sampled):
+        assert sampled, sampled.text
+        groups.append((sampled.sample.consistent, [int(one.value) for one in sampled.sample.variables]))
+        if len(groups) >= 10:
+            enough.set()
+    def on_total(sampled):
+        if sampled and sampled.sample.variables[0].forced and sampled.sample.variables[0].value == "7":
+            held.set()
+    with client.watch_variables(*of, ["fast.count", "fast.twice"], 0.02, on_group), \
+            client.watch_variables(*of, ["line.total"], 0.1, on_total):
+        client.force_variable(*of, "line.total", "7")
+        assert held.wait(20) and enough.wait(20), groups
+    assert all(2 * count == twice for consistent, (count, twice) in groups if consistent), groups
+    assert any(consistent for consistent, _ in groups), groups
+    forced = [(one.host, one.instance, one.name, one.forced_value, one.type) for one in client.forces()]
+    assert forced == [("north", "press1", "line.total", "7", "DINT")], forced
+    assert client.forces("north", "packer1") == []
+    client.unforce_variable(*of, "line.total")
+    follows("line.total", "41")
+    client.force_variable(*of, name="grid[1,1]", value="99")
+    client.unforce_all(*of)
+    assert client.forces("north") == []
+    error = plchost_client.ClientError
+    assert "did you mean" in refused(error.not_found, client.write_variable, *of, "line.totel", "1")
+    refused(error.refused, client.force_variable, *of, "line.stopped", "TRUE")
+    refused(error.wrong_state, client.unforce_variable, *of, "line.total")
+    refused(error.invalid_argument, client.write_variable, *of, "line.total=5", "1")
+    refused(error.invalid_argument, client.unforce_variable, *of, "*")
+    refused(error.not_found, client.forces, "north", "press7")
+    assert "10 to 3600000" in refused(error.invalid_argument, client.watch_variables, *of, ["fast.*"], 0.001, print)
+    unknown = threading.Event()
+    with client.watch_variables(*of, ["line.totel"], 0.01, lambda one: unknown.set() if one.code == error.not_found else None):
+        assert unknown.wait(20)
+EOF
+PYTHONPATH=$BIN/../python python3 "$cell/variables.py" >"$cell/variables.log" 2>&1 || fail "variables of Python"
 
 echo "- Python sends an application, and shows what there is"
 (cat "$APPLICATIONS/packer.so" && echo "of another digest") >"$cell/other.so"
