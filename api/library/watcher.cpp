@@ -1,6 +1,7 @@
 #include "api/library/watcher.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "api/dds/text.hpp"
@@ -57,15 +58,24 @@ void Client::Watcher::add(std::shared_ptr<LookingWatch> subscription) {
 }
 
 std::optional<Client::Watcher::Subscriptions> Client::Watcher::wait_for_live() {
-  std::unique_lock lock(mutex_);
   for (;;) {
+    // They end without the mutex: a callback in Python waits for a thread that may wait for the mutex in
+    // add().
+    Subscriptions stopped;
+    std::unique_lock lock(mutex_);
     if (ending_) return std::nullopt;
-    std::erase_if(subscriptions_, [](const auto& subscription) { return subscription->stopped(); });
-    if (!subscriptions_.empty()) break;
-    changed_.wait(lock);
+    const auto rest =
+        std::ranges::stable_partition(subscriptions_, [](const auto& one) { return !one->stopped(); });
+    std::ranges::move(rest, std::back_inserter(stopped));
+    subscriptions_.erase(rest.begin(), rest.end());
+    if (!stopped.empty()) continue;
+    if (subscriptions_.empty()) {
+      changed_.wait(lock);
+      continue;
+    }
+    if (std::exchange(has_new_, false)) looked_.reset();
+    return subscriptions_;
   }
-  if (std::exchange(has_new_, false)) looked_.reset();
-  return subscriptions_;
 }
 
 bool Client::Watcher::connect() {

@@ -183,6 +183,16 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
 EOF
 PYTHONPATH=$BIN/../python python3 "$cell/sends.py" "$APPLICATIONS/packer.so" "$cell/other.so" || fail "an application that Python sends"
 
+echo "- Python begins watches while others end"
+cat >"$cell/watches.py" <<'EOF'
+import os, plchost_client
+with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
+    for _ in range(300):
+        client.watch_hosts(lambda host: None).stop()
+        client.watch_variables("north", "press1", ["fast.*"], 0.01, lambda sampled: None).stop()
+EOF
+PYTHONPATH=$BIN/../python timeout 60 python3 "$cell/watches.py" >"$cell/watches.log" 2>&1 || fail "watches that begin and end: $?"
+
 echo "- Python ends in peace while a client watches, and a callback that raises is told"
 cat >"$cell/ends.py" <<'EOF'
 import os, threading, plchost_client
