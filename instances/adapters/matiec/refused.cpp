@@ -18,9 +18,8 @@ namespace {
 
 using iec::Token;
 
-// The macros of glibc and of iec2c's library that stand for values, as `cc -dM -E` of iec_std_lib.h tells
-// them. iec2c writes each name in upper case, so a variable of such a name becomes a number in the C. In
-// order.
+// Sorted: macros of glibc and of iec2c's library that stand for values. `cc -dM -E` tells them. iec2c writes
+// each name in upper case. So a variable of such a name becomes a number in the C.
 constexpr std::array<std::string_view, 212> kMacros{
     "AIO_PRIO_DELTA_MAX",
     "BC_BASE_MAX",
