@@ -11,6 +11,7 @@
 #include "api/library/variables.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
+#include "shm/base/next_on_grid.hpp"
 
 namespace plchost {
 
@@ -25,12 +26,6 @@ void check_interval(std::chrono::milliseconds interval) {
   throw_client_error({ErrorCode::invalid_argument, 0,
                       fmt::format("interval {} ms: allowed are {} to {}", interval.count(),
                                   kMinInterval.count(), kMaxInterval.count())});
-}
-
-/// The next time of the grid that is not over.
-TimePoint next_on_grid(TimePoint planned, TimePoint now, Duration interval) {
-  return now < planned + interval ? planned + interval
-                                  : planned + ((now - planned) / interval + 1) * interval;
 }
 
 Client::Sampled sampled_of(Result<Client::Sample> sample) {

@@ -80,10 +80,8 @@ class MatiecTranslator : public Translator {
   // Of the C that is copied from a pragma, else of the statement that a line of C is made from.
   [[nodiscard]] std::optional<iec::SourcePlace> source_of(const std::string& file, unsigned line) const {
     if (std::filesystem::path(file).filename() != kCode) return std::nullopt;
-    const auto code = context_.folder().read(kCode);
-    if (!code) return std::nullopt;
-    if (auto place = place_in_pragma(matiec::line_in(*code, line), context_.sources)) return place;
-    const unsigned joined = matiec::joined_line_of(*code, line);
+    if (auto place = place_in_pragma(matiec::line_in(code_, line), context_.sources)) return place;
+    const unsigned joined = matiec::joined_line_of(code_, line);
     if (joined == 0) return std::nullopt;
     return joined_->place(joined, 0);
   }
@@ -142,8 +140,9 @@ class MatiecTranslator : public Translator {
 
   bool drop_directives() {
     const auto code = context_.folder().read(kCode);
-    return context_.has(code) &&
-           context_.has(context_.folder().replace(kCode, matiec::without_directives(*code)));
+    if (!context_.has(code)) return false;
+    code_ = matiec::without_directives(*code);
+    return context_.has(context_.folder().replace(kCode, code_));
   }
 
   bool instrument() {
@@ -154,11 +153,13 @@ class MatiecTranslator : public Translator {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }
     pous_ = std::move(made.pous);
-    return context_.has(context_.folder().replace(kCode, made.text)) &&
+    code_ = std::move(made.text);
+    return context_.has(context_.folder().replace(kCode, code_)) &&
            context_.has(context_.folder().write(std::string(iec::kDebugFile), iec::debug_header(pous_)));
   }
 
   BuildContext& context_;
+  std::string code_;                 // of the program, as the C compiler gets it
   std::vector<iec::DebugPou> pous_;  // of a debug build
   matiec::Compiler compiler_;
   std::optional<matiec::JoinedSource> joined_;

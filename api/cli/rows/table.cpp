@@ -110,15 +110,19 @@ std::unexpected<Error> unknown_field(std::string_view field, const std::vector<s
 
 std::string csv_field(const Row& value) {
   if (value.is_null()) return "";
-  std::string text = value.is_string() ? printable(value.get<std::string>())
-                                       : value.dump(-1, ' ', false, Row::error_handler_t::replace);
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
+  const std::string text = value.is_string() ? printable(value.get<std::string>())
+                                             : value.dump(-1, ' ', false, Row::error_handler_t::replace);
+  return csv_cell(text);
 }
 
 }  // namespace
+
+std::string csv_cell(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+  std::string cell = "\"";
+  for (const char c : text) cell.append(c == '"' ? 2 : 1, c);
+  return cell + "\"";
+}
 
 std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
                          const TableStyle& style) {

@@ -7,17 +7,6 @@
 
 namespace plchost {
 
-namespace {
-
-std::string csv_cell(std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-  std::string cell = "\"";
-  for (const char c : text) cell.append(c == '"' ? 2 : 1, c);
-  return cell + "\"";
-}
-
-}  // namespace
-
 dds::Computed<plc_VariableRecord, Row> computed_of(const plc_VariableRecord& /*variable*/,
                                                    const VariableOwner& owner) {
   return {.host = owner.host, .instance = owner.instance};

@@ -11,6 +11,7 @@
 
 #include "api/cli/interrupt.hpp"
 #include "api/cli/rows/variable_rows.hpp"
+#include "shm/base/next_on_grid.hpp"
 
 namespace plchost {
 
@@ -94,8 +95,7 @@ int record(CliSession& session, const RecordArguments& arguments) {
 }  // namespace
 
 TimePoint SampleTimes::after(TimePoint planned, TimePoint now) const noexcept {
-  const TimePoint next = planned + interval_;
-  return next > now ? next : planned + ((now - planned) / interval_ + 1) * interval_;
+  return next_on_grid(planned, now, interval_);
 }
 
 int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times,

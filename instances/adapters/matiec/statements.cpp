@@ -46,7 +46,7 @@ class Instrumenter {
 
  private:
   void take(std::string_view line) {
-    if (line.starts_with(kLine)) return take_statement(line.substr(kLine.size()));
+    if (line.starts_with(kLine)) return take_statement(number_behind(kLine, line));
     if (line == kFunction) {
       function_follows_ = true;
     } else if (function_follows_ && line.find('(') != std::string_view::npos) {
@@ -69,10 +69,8 @@ class Instrumenter {
     number_.reset();
   }
 
-  // "N "FILE"": the statement of that line of the joined source follows. A POU with none stays as it is.
-  void take_statement(std::string_view line) {
-    unsigned joined = 0;
-    std::from_chars(line.data(), line.data() + line.size(), joined);
+  // The statement of that line of the joined source follows. A POU with none stays as it is.
+  void take_statement(unsigned joined) {
     const iec::SourcePlace place = source_.place(joined, 1);
     if (name_.empty() || !opened_at_ || joined == 0) return;
     if (!number_) {

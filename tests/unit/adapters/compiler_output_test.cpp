@@ -5,20 +5,16 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/unit/adapters/problem_texts.hpp"
+
 namespace plchost {
 namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-std::vector<std::string> described(const iec::SourceProblems& problems) {
-  std::vector<std::string> result;
-  for (const iec::SourceProblem& problem : problems) result.push_back(iec::describe(problem));
-  return result;
-}
-
 std::vector<std::string> told(std::string_view output) {
-  return described(problems_of_compiler(
+  return texts(problems_of_compiler(
       output, [](const std::string& file, unsigned line) -> std::optional<iec::SourcePlace> {
         if (file != "/line/main.st") return std::nullopt;
         return iec::SourcePlace{"main.st", line, 0};
@@ -67,7 +63,7 @@ TEST(OutputOfTheLoader, NamesASymbolThatAPragmaUses) {
   const std::string output = "/tmp/line.so cannot be loaded: /tmp/line.so: undefined symbol: __tick\n";
   EXPECT_EQ(undefined_symbol(output), "__tick");
   EXPECT_EQ(undefined_symbol("other"), "");
-  EXPECT_THAT(described(pragmas_with(undefined_symbol(output), kSources)),
+  EXPECT_THAT(texts(pragmas_with(undefined_symbol(output), kSources)),
               ElementsAre("a.st:2:25: the C in this pragma uses __tick, which plchost does not have"));
   EXPECT_THAT(pragmas_with("", kSources), IsEmpty());
 }

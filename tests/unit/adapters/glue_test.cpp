@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "instances/adapters/iec/task_file.hpp"
+#include "tests/unit/adapters/problem_texts.hpp"
 
 namespace plchost::matiec {
 namespace {
@@ -20,11 +21,6 @@ using testing::Not;
 
 class MatiecGlue : public testing::Test {
  protected:
-  static std::vector<std::string> texts(const iec::SourceProblems& problems) {
-    std::vector<std::string> result;
-    for (const iec::SourceProblem& problem : problems) result.push_back(iec::describe(problem));
-    return result;
-  }
   Glue write(const std::string& programs, const std::string& globals, const std::string& resource,
              const std::vector<Located>& located = {}, const std::string& task_file = "") {
     const std::vector<iec::Source> sources{

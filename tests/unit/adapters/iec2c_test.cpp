@@ -9,6 +9,7 @@
 
 #include "instances/adapters/build_application.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/unit/adapters/problem_texts.hpp"
 
 namespace plchost::matiec {
 namespace {
@@ -22,10 +23,7 @@ const std::vector<iec::Source> kSources{{"a.st", "PROGRAM P\nEND_PROGRAM"},
 
 std::vector<std::string> told(const std::string& output) {
   const iec::Project project = iec::read_project(kSources).project;
-  std::vector<std::string> result;
-  for (const auto& problem : problems_of(output, JoinedSource(kSources), project, "/nowhere"))
-    result.push_back(iec::describe(problem));
-  return result;
+  return texts(problems_of(output, JoinedSource(kSources), project, "/nowhere"));
 }
 
 TEST(Iec2cErrors, AreToldAtTheirPlaceInTheSources) {

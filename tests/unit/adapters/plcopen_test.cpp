@@ -10,6 +10,7 @@
 #include "instances/adapters/plcopen/iso_duration.hpp"
 #include "instances/adapters/plcopen/project_file.hpp"
 #include "instances/adapters/plcopen/structured_text.hpp"
+#include "tests/unit/adapters/problem_texts.hpp"
 
 namespace plchost::plcopen {
 namespace {
@@ -54,9 +55,7 @@ StructuredText read(const std::string& xml) {
   return structured_text_of({"a.xml", xml});
 }
 std::vector<std::string> problems_of(const std::string& xml) {
-  std::vector<std::string> result;
-  for (const auto& problem : read(xml).problems) result.push_back(iec::describe(problem));
-  return result;
+  return texts(read(xml).problems);
 }
 /// The text of a project in which nothing is wrong.
 std::string text_of(const std::string& xml) {

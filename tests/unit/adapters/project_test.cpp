@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/unit/adapters/problem_texts.hpp"
+
 namespace plchost::iec {
 namespace {
 
@@ -48,9 +50,7 @@ ReadProject read(std::string_view text) {
   return read_project(sources);
 }
 std::vector<std::string> problems_of(std::string_view text) {
-  std::vector<std::string> result;
-  for (const SourceProblem& problem : read(text).problems) result.push_back(describe(problem));
-  return result;
+  return texts(read(text).problems);
 }
 std::string in_resource(const std::string& text) {
   return "CONFIGURATION c RESOURCE r ON PLC\n" + text + "\nEND_RESOURCE END_CONFIGURATION";

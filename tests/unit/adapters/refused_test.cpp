@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/unit/adapters/problem_texts.hpp"
+
 namespace plchost::matiec {
 namespace {
 
@@ -12,19 +14,14 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-std::vector<std::string> described(const iec::SourceProblems& problems) {
-  std::vector<std::string> result;
-  for (const iec::SourceProblem& problem : problems) result.push_back(iec::describe(problem));
-  return result;
-}
 std::vector<iec::Source> source(const std::string& text) {
   return {{"a.st", text}};
 }
 std::vector<std::string> names(const std::string& text) {
-  return described(refused_names(iec::read_project(source(text)).project));
+  return texts(refused_names(iec::read_project(source(text)).project));
 }
 std::vector<std::string> words(const std::string& text) {
-  return described(refused_words(source(text)));
+  return texts(refused_words(source(text)));
 }
 
 TEST(RefusedByMatiec, AreNamesThatAreMacrosOfC) {

@@ -13,6 +13,7 @@
 #include "instances/adapters/strucpp/compiler.hpp"
 #include "instances/adapters/strucpp/glue.hpp"
 #include "instances/adapters/strucpp/plan_file.hpp"
+#include "tests/unit/adapters/problem_texts.hpp"
 
 namespace plchost::strucpp {
 namespace {
@@ -76,12 +77,6 @@ struct Parts {
            programs + "]}]}]}";
   }
 };
-
-std::vector<std::string> texts(const iec::SourceProblems& problems) {
-  std::vector<std::string> result;
-  for (const iec::SourceProblem& problem : problems) result.push_back(iec::describe(problem));
-  return result;
-}
 
 ReadPlan read(const Parts& parts) {
   const std::vector<std::string> sources{"a.st"};

@@ -6,6 +6,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/unit/adapters/problem_texts.hpp"
+
 namespace plchost::iec {
 namespace {
 
@@ -52,11 +54,7 @@ class TaskFile : public testing::Test {
     auto [project, found] = read_project(sources);
     EXPECT_TRUE(found.empty()) << describe(found.front());
     configuration = std::move(project.configurations.at(0));
-    std::vector<std::string> result;
-    for (const SourceProblem& problem : read_task_file({"a.toml", text}, configuration)) {
-      result.push_back(describe(problem));
-    }
-    return result;
+    return texts(read_task_file({"a.toml", text}, configuration));
   }
   const TaskExtension& of(std::size_t task, std::size_t resource = 0) {
     return configuration.resources.at(resource).tasks.at(task).extension;
