@@ -156,7 +156,8 @@ TEST_F(OneHost, IsNamedToPlcctl) {
   EXPECT_EQ(none.code, 3);
   EXPECT_THAT(none.errors, HasSubstr("no host 'hostc' answers"));
   const auto offered = [&](std::vector<std::string> words) {
-    words.insert(words.begin(), {"__complete", "--domain", std::to_string(domain_.number())});
+    words.insert(words.begin(),
+                 {"__complete", "--domain", std::to_string(domain_.number()), "--timeout", "20"});
     return run_program(PLCCTL_PROGRAM, words).output;
   };
   until_it_is_so([&] { return offered({"--host", "hosta", "show", "instance", ""}) == "line1\trunning\n"; });

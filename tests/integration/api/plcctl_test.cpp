@@ -166,7 +166,8 @@ TEST_F(Plcctl, WaitsForTheStateOfInstances) {
 
 TEST_F(Plcctl, CompletesTheNamesThatThereAre) {
   const auto offered = [&](std::vector<std::string> words) {
-    words.insert(words.begin(), {"__complete", "--domain", std::to_string(domain_.number())});
+    words.insert(words.begin(),
+                 {"__complete", "--domain", std::to_string(domain_.number()), "--timeout", "20"});
     return run_program(PLCCTL_PROGRAM, words).output;
   };
   EXPECT_EQ(offered({"show", "instance", ""}), "line1\trunning\n");
@@ -180,10 +181,10 @@ TEST_F(Plcctl, CompletesTheNamesThatThereAre) {
 
 TEST_F(Plcctl, CompletesInBash) {
   const std::string folder = std::filesystem::path(PLCCTL_PROGRAM).parent_path();
-  const std::string script =
-      "PATH=" + folder + ":$PATH PLCHOST_DOMAIN=" + std::to_string(domain_.number()) +
-      "; export PLCHOST_DOMAIN; source <(plcctl completion bash); COMP_WORDS=(plcctl show instance l); "
-      "COMP_CWORD=3; _plcctl; echo \"${COMPREPLY[@]}\"";
+  const std::string script = "PATH=" + folder + ":$PATH PLCHOST_DOMAIN=" + std::to_string(domain_.number()) +
+                             "; export PLCHOST_DOMAIN; source <(plcctl completion bash); COMP_WORDS=(plcctl "
+                             "--timeout 20 show instance l); "
+                             "COMP_CWORD=5; _plcctl; echo \"${COMPREPLY[@]}\"";
   EXPECT_EQ(run_program("/bin/bash", {"-c", script}).output, "line1\n");
 }
 

@@ -11,10 +11,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "api/control/control_handler.hpp"
 #include "instances/launch/launch_contract.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/transition_ring.hpp"
-#include "shm/sockets/packet_socket.hpp"
 #include "tests/support/interrupted_write.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/receive_until.hpp"
@@ -48,7 +48,10 @@ TestHost::TestHost(const OwnDomain& domain, std::string name, std::uint32_t max_
       page_(HostPageWriter::create(pool_name_).value()) {
   std::filesystem::create_directory(run_directory_);
   write_count(0);
-  manager_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+  // Before there is a server, which ends if nobody listens.
+  manager_ =
+      std::jthread([this, listener = PacketListener::listen(manager_socket_path(run_directory_)).value()](
+                       const std::stop_token& stop) mutable { serve(listener, stop); });
 }
 
 TestHost::~TestHost() {
@@ -131,7 +134,6 @@ void TestHost::start_server(std::vector<std::string> more) {
                                      "--pool",      pool_name_, "--run-directory", run_directory_,
                                      "--interface", "lo",       "--log-level",     "warning"};
   arguments.insert(arguments.end(), more_arguments_.begin(), more_arguments_.end());
-  while (!std::filesystem::exists(run_directory_ + "/manager.sock")) ::usleep(1000);
   server_ = std::make_unique<Child>(PLCHOST_DDS_PROGRAM, arguments, log_file_);
 }
 
@@ -162,8 +164,7 @@ ControlReply TestHost::forward(const ControlRequest& request) const {
   return decode_reply(receive_until(link, soon()).value()).value();
 }
 
-void TestHost::serve(const std::stop_token& stop) {
-  auto listener = PacketListener::listen(run_directory_ + "/manager.sock").value();
+void TestHost::serve(PacketListener& listener, const std::stop_token& stop) {
   std::optional<PacketSocket> peer;
   while (!stop.stop_requested()) {
     std::array<pollfd, 2> fds{pollfd{listener.fd(), POLLIN, 0}, pollfd{peer ? peer->fd() : -1, POLLIN, 0}};

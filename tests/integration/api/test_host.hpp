@@ -16,6 +16,7 @@
 #include "shm/pages/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/sockets/control_message.hpp"
+#include "shm/sockets/packet_socket.hpp"
 #include "tests/integration/api/child.hpp"
 
 namespace plchost {
@@ -84,7 +85,7 @@ class TestHost {
   std::atomic<bool> close_peer{false};  ///< the manager hangs up
 
  private:
-  void serve(const std::stop_token& stop);
+  void serve(PacketListener& listener, const std::stop_token& stop);
   ControlReply check_host(const std::string& argument);
   [[nodiscard]] ControlReply forward(const ControlRequest& request) const;
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Tab, in bash, zsh and fish: words of plcctl, names that there are, and no name that a shell would run.
+# Tab, in bash, zsh and fish: words of plcctl, names that there are, and no name that a shell would run. Names are waited
+# for as long as --timeout says, which is 1 s if nothing is said.
 . "$(dirname "$0")/common.sh"
 export PATH=$BIN:$PATH
 
@@ -21,15 +22,15 @@ echo "- bash"
 # bash_offers WORD...: the last one is completed
 bash_offers() { bash -c 'source <(plcctl completion bash); COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _plcctl; printf "%s\n" "${COMPREPLY[@]}"' - "$@"; }
 is "$(bash_offers plcctl sh)" show || fail "$(bash_offers plcctl sh)"
-is "$(bash_offers plcctl show instance p)" packer1 || fail "$(bash_offers plcctl show instance p)"
-is "$(bash_offers plcctl post event packer1/p)" packer1/product || fail "$(bash_offers plcctl post event packer1/p)"
-is "$(bash_offers plcctl set scheduler packer1 CmpScheduleT)" CmpScheduleTimer || fail "$(bash_offers plcctl set scheduler packer1 C)"
+is "$(bash_offers plcctl --timeout 20 show instance p)" packer1 || fail "$(bash_offers plcctl --timeout 20 show instance p)"
+is "$(bash_offers plcctl --timeout 20 post event packer1/p)" packer1/product || fail "$(bash_offers plcctl --timeout 20 post event packer1/p)"
+is "$(bash_offers plcctl --timeout 20 set scheduler packer1 CmpScheduleT)" CmpScheduleTimer || fail "$(bash_offers plcctl --timeout 20 set scheduler packer1 C)"
 
 echo "- fish"
 fish_offers() { HOME=$cell fish -c "plcctl completion fish | source; complete -C '$*'"; }
 is "$(fish_offers plcctl sh | cut -f1)" show || fail "$(fish_offers plcctl sh)"
-is "$(fish_offers plcctl show instance p)" $'packer1\trunning' || fail "$(fish_offers plcctl show instance p)"
-is "$(fish_offers plcctl post event packer1/p | cut -f1)" packer1/product || fail "$(fish_offers plcctl post event packer1/p)"
+is "$(fish_offers plcctl --timeout 20 show instance p)" $'packer1\trunning' || fail "$(fish_offers plcctl --timeout 20 show instance p)"
+is "$(fish_offers plcctl --timeout 20 post event packer1/p | cut -f1)" packer1/product || fail "$(fish_offers plcctl --timeout 20 post event packer1/p)"
 PATH=$cell/stranger:$PATH fish_offers plcctl show object x >/dev/null
 [ ! -e "$cell/was_run" ] || fail "fish has run a name"
 
@@ -52,8 +53,8 @@ exit 1
 EOF
 typed() { HOME=$cell zsh -f "$cell/typed.zsh" "$@" || fail "zsh does not make '$2' of '$1'"; }
 typed "plcctl sh" "plcctl show "
-typed "plcctl show instance p" "plcctl show instance packer1 "
-typed "plcctl post event packer1/p" "plcctl post event packer1/product "
+typed "plcctl --timeout 20 show instance p" "plcctl --timeout 20 show instance packer1 "
+typed "plcctl --timeout 20 post event packer1/p" "plcctl --timeout 20 post event packer1/product "
 PATH=$cell/stranger:$PATH typed "plcctl show object x" 'x\$\(touch\ '"$cell"'/was_run\)\;y'
 [ ! -e "$cell/was_run" ] || fail "zsh has run a name"
 
