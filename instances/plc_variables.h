@@ -82,7 +82,7 @@ typedef struct {
   unsigned int nDimensions; /* as many as the name has "[]" */
   Plc_Dimension aDimensions[PLC_MAX_DIMENSIONS];
   const char* pszTask; /* the only task whose cycles use it; null: any */
-  const char* pszArea; /* for people: where it is mapped to, as "%QX0.1"; null: nowhere */
+  const char* pszArea; /* for people: where it is mapped to, as "%QX0.1", or "retain"; null: nowhere */
 } Plc_Variable;
 
 /* Declares a variable. From plc_app_init only. ERR_OK; ERR_PARAMETER: null, dwSize, a name, type, size or

@@ -128,6 +128,8 @@ int plchost_declare_symbols(void);
 /* From variables.c. */
 int plchost_declare_variables(void);
 void plchost_forget_variables(void);
+/* Whether that byte is one of a retained variable. After they were declared. */
+int plchost_is_retained(const void* value);
 void plchost_keep_retained(const struct plchost_task* task);
 
 #ifdef __cplusplus

@@ -30,6 +30,7 @@ static void declare(const struct plchost_symbol* symbol) {
   }
   variable.pszTask = symbol->task;
   variable.pszArea = symbol->area;
+  if (symbol->area == NULL && plchost_is_retained(symbol->value)) variable.pszArea = "retain";
   result = plc_declare_variable(&variable);
   if (result != ERR_OK && declaring == ERR_OK) declaring = result;
 }

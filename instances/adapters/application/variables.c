@@ -17,6 +17,7 @@ struct retained {
 static struct retained* retained;
 static unsigned int retained_count;
 static unsigned int retained_bytes;
+static const struct retained** by_address;
 static unsigned long long retained_layout = 0xcbf29ce484222325ull;
 static unsigned char* initial;
 static Plc_Area_Use* users;
@@ -62,6 +63,26 @@ static void lay_out(const struct plchost_variable* variable) {
   ++retained_count;
 }
 
+static int compare_addresses(const void* left, const void* right) {
+  const unsigned char* const one = (*(const struct retained* const*)left)->value;
+  const unsigned char* const other = (*(const struct retained* const*)right)->value;
+  return (one > other) - (one < other);
+}
+
+int plchost_is_retained(const void* value) {
+  const unsigned char* const byte = value;
+  unsigned int first = 0;
+  unsigned int end = retained_count; /* the first one that lies behind */
+  while (first < end) {
+    const unsigned int middle = first + (end - first) / 2;
+    if (by_address[middle]->value <= byte)
+      first = middle + 1;
+    else
+      end = middle;
+  }
+  return end > 0 && byte < by_address[end - 1]->value + by_address[end - 1]->bytes;
+}
+
 /* On the control thread, before any task runs. */
 static void CDECL restore(unsigned int event, const EVTPARAM_ExternalEventTask* parameter, void* user) {
   const unsigned char* const kept = plc_area_address(area);
@@ -82,7 +103,8 @@ static int declare_area(void) {
   retained = calloc(retained_count, sizeof *retained);
   initial = calloc(retained_bytes, 1);
   users = calloc(plchost_task_count, sizeof *users);
-  if (retained == NULL || initial == NULL || users == NULL) return 0;
+  by_address = calloc(retained_count, sizeof(const struct retained*));
+  if (retained == NULL || initial == NULL || users == NULL || by_address == NULL) return 0;
   memset(&declared, 0, sizeof declared);
   declared.dwSize = sizeof declared;
   declared.dwFlags = PLC_AREA_RETAIN;
@@ -93,6 +115,8 @@ static int declare_area(void) {
   retained_count = 0;
   retained_bytes = 0;
   plchost_each_variable(lay_out);
+  for (i = 0; i < retained_count; ++i) by_address[i] = &retained[i];
+  qsort(by_address, retained_count, sizeof(const struct retained*), compare_addresses);
   for (i = 0; i < plchost_task_count; ++i) {
     if (plchost_tasks[i].retained_count > 0) users[declared.nUses++].pszTask = plchost_tasks[i].name;
   }
@@ -126,6 +150,7 @@ void plchost_keep_retained(const struct plchost_task* task) {
 }
 
 void plchost_forget_variables(void) {
+  free(by_address);
   free(retained);
   free(initial);
   free(users);
