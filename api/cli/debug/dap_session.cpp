@@ -184,10 +184,11 @@ Json DapSession::set_one(const std::string& key, const Result<std::string>& plac
 // All of a source, in the place of those before.
 DapSession::Answer DapSession::set_breakpoints(const Json& arguments) {
   const Json source = arguments.value("source", Json::object());
-  const std::string path =
-      text_in(source, "path").empty() ? text_in(source, "name") : text_in(source, "path");
+  const std::string whole = text_in(source, "path");
+  const std::string path = whole.empty() ? text_in(source, "name") : whole;
   if (path.empty()) return failure(ErrorCode::invalid_argument, "the source has no path and no name");
   remove_of(path);
+  if (!whole.empty()) paths_[last_name(whole)] = whole;
   const auto file = place_in(last_name(path), "a file");
   Json made = Json::array();
   for (const Json& wanted : list_in(arguments, "breakpoints")) {
@@ -228,11 +229,15 @@ DapSession::Answer DapSession::stack(const Json& arguments) {
   const Json* const task = task_in(state_, name);
   for (const Json& frame : task == nullptr ? Json::array() : task->value("stack", Json::array())) {
     const std::string file = frame.value("file", "");
-    frames.push_back({{"id", thread * kFramesOfThread + static_cast<std::int64_t>(frames.size())},
-                      {"name", frame.value("pou", "")},
-                      {"line", frame.value("line", 0)},
-                      {"column", 1},
-                      {"source", {{"name", last_name(file)}, {"path", file}}}});
+    const std::string name_of_file = last_name(file);
+    const auto of_client = paths_.find(name_of_file);
+    frames.push_back(
+        {{"id", thread * kFramesOfThread + static_cast<std::int64_t>(frames.size())},
+         {"name", frame.value("pou", "")},
+         {"line", frame.value("line", 0)},
+         {"column", 1},
+         {"source",
+          {{"name", name_of_file}, {"path", of_client == paths_.end() ? file : of_client->second}}}});
   }
   const std::size_t total = frames.size();
   return Json{{"stackFrames", std::move(frames)}, {"totalFrames", total}};

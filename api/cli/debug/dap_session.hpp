@@ -67,6 +67,7 @@ class DapSession {
   Json state_;
   std::vector<std::string> tasks_;  // thread 1 is the first
   DebugNews news_;
+  std::map<std::string, std::string> paths_;               // of the client, by the last part
   std::map<std::string, std::vector<std::uint32_t>> ids_;  // breakpoints by source, or "" of functions
 };
 

@@ -119,6 +119,18 @@ TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
   EXPECT_THAT(instance_.written, ElementsAre("Main.n=5"));
 }
 
+TEST_F(DapSessionTest, ShowsASourceByThePathThatItsClientHasForIt) {
+  const auto shown_path = [&] {
+    return ask("stackTrace", {{"threadId", 1}})["stackFrames"][0]["source"]["path"];
+  };
+  EXPECT_EQ(shown_path(), "a.st") << "as it was built";
+  (void)ask("setBreakpoints", {{"source", {{"path", "/src/b.st"}}}, {"breakpoints", json::array()}});
+  (void)ask("setBreakpoints", {{"source", {{"name", "a.st"}}}, {"breakpoints", json::array()}});
+  EXPECT_EQ(shown_path(), "a.st");
+  (void)ask("setBreakpoints", {{"source", {{"path", "/src/a.st"}}}, {"breakpoints", json::array()}});
+  EXPECT_EQ(shown_path(), "/src/a.st") << "an editor opens only a whole path";
+}
+
 TEST_F(DapSessionTest, SetsFunctionBreakpointsByTheirNames) {
   const json wanted = {{"breakpoints", json::array({{{"name", " Main "}, {"condition", "n > 5"}}})}};
   EXPECT_TRUE(ask("setFunctionBreakpoints", wanted)["breakpoints"][0]["verified"]);
