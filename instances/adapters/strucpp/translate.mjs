@@ -2,12 +2,13 @@
 // folder for the files between. Reads order.json there: {"sources": [{"name", "text"}]}. Writes the C++ files and
 // plan.json: what is wrong, else the program's tasks, POUs, types and variables, which plcctl checks and plans.
 // Exit code 0: plan.json was written, also if the program has errors.
-import { readFileSync, writeFileSync } from 'node:fs';
+import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 const kMostMessages = 100; // more are not told
 const kMostSymbols = 65536; // as plc_variables.h has it
+const kMostBases = 32; // that a block extends, one above the other
 const kMostElements = 1000; // of an array of function blocks, each with variables of its own
 
 const folder = resolve(process.argv[2]);
@@ -267,7 +268,7 @@ class Plan {
   blockVariables(block, depth = 0) {
     const base = block.extends?.toUpperCase();
     let inherited = [];
-    if (base !== undefined && depth < 32) {
+    if (base !== undefined && depth < kMostBases) {
       inherited = this.blocks.has(base) ? this.blockVariables(this.blocks.get(base), depth + 1) : this.libraryVariables(base);
     }
     return [...inherited, ...this.declared(block, block.name), ...this.reached(block)];
@@ -356,6 +357,27 @@ class Plan {
   }
 }
 
+// The compiler's table for debuggers, which leaves out what a block inherits: it is made again from blocks that have all
+// their variables themselves. Nothing else may use the blocks behind that.
+async function debugTable({ ast, projectModel, symbolTables, debugTableCpp }) {
+  const maker = join(folder, 'dist', 'backend', 'debug-table-gen.js');
+  const heirs = ast.functionBlocks.filter((block) => block.extends !== undefined);
+  if (heirs.length === 0 || projectModel === undefined || symbolTables === undefined || !existsSync(maker)) return debugTableCpp ?? '';
+  const { generateDebugTable } = await import(pathToFileURL(maker).href);
+  const sectionsOf = (name, depth = 0) => {
+    const block = symbolTables.lookupFunctionBlock(name.toUpperCase());
+    if (block === undefined || depth > kMostBases) return [];
+    const { extends: base, varBlocks } = block.declaration;
+    const ofLibrary = [...block.inputs, ...block.outputs].map((one) => ({ blockType: 'VAR_INPUT', declarations: [{ names: [one.name], type: one.declaration.type }] }));
+    return [...(base === undefined ? [] : sectionsOf(base, depth + 1)), ...(ofLibrary.length > 0 ? ofLibrary : varBlocks)];
+  };
+  const whole = heirs.map((block) => [symbolTables.lookupFunctionBlock(block.name.toUpperCase()), sectionsOf(block.name)]);
+  for (const [block, sections] of whole) {
+    if (block !== undefined) block.declaration.varBlocks = sections;
+  }
+  return generateDebugTable(ast, projectModel, symbolTables).debugTableCpp;
+}
+
 // The variables of the compiler's table for debuggers, each array as one: GRID[][].X and the bounds of its indexes. An
 // entry of the table: { (void*)&g_config.ONE.GRID[-1][0].X, TAG_REAL, 0 },  // ONE.GRID[-1][0].X
 function symbolsOf(table) {
@@ -390,7 +412,8 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
-  plan.symbols = symbolsOf(result.debugTableCpp ?? '');
+  const table = await debugTable(result);
+  plan.symbols = symbolsOf(table);
   if (plan.symbols.length > kMostSymbols) {
     found.remarks.push({ place: [-1, 0, 0], text: `${plan.symbols.length} variables: those beyond ${kMostSymbols} cannot be seen from outside` });
     plan.symbols.length = kMostSymbols;
@@ -403,7 +426,7 @@ if (result.success) {
     plan.files.push(file.name);
   }
   writeFileSync('generated.hpp', result.headerCode, { flag: 'wx' });
-  writeFileSync('debug_table.cpp', result.debugTableCpp ?? '', { flag: 'wx' });
+  writeFileSync('debug_table.cpp', table, { flag: 'wx' });
   writeFileSync('debug_map.json', JSON.stringify(result.debugMap ?? {}), { flag: 'wx' });
 }
 writeFileSync('plan.json', JSON.stringify(plan), { flag: 'wx' });

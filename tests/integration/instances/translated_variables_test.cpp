@@ -59,6 +59,7 @@ PROGRAM Main
     day1 : DATE := D#2026-11-25;
   END_VAR
   VAR lamp AT %QX0.1 : BOOL; END_VAR
+  VAR RETAIN cycles : DINT; pumps : Pump; steps : ARRAY[1..3] OF INT; END_VAR
   twice := rate * 2;
   total := total + 1;
   pump1(go := lamp);
@@ -88,6 +89,10 @@ TEST_P(VariablesOfTranslatedText, AreSeenWrittenAndForcedFromOutside) {
   EXPECT_EQ(type_text(symbol("one.grid[0,1]")), "ARRAY [0..1, 1..2] OF INT");
   EXPECT_EQ(symbol("one.rate").task, "fast");
   EXPECT_EQ(symbol("one.lamp").area, "%QX0.1");
+  EXPECT_EQ(symbol("one.cycles").area, "retain");
+  EXPECT_EQ(symbol("one.pumps.hours").area, "retain");
+  EXPECT_EQ(symbol("one.steps[3]").area, "retain");
+  EXPECT_EQ(symbol("one.rate").area, "");
   EXPECT_EQ(write("one.rate=21").code, ErrorCode::ok);
   EXPECT_TRUE(soon("one.twice", "42"));
   EXPECT_TRUE(soon("one.p.tags[2]", "42"));
@@ -116,6 +121,47 @@ TEST_P(VariablesOfTranslatedText, AreSeenWrittenAndForcedFromOutside) {
   EXPECT_EQ(sut->runtime().forces, 3);
   EXPECT_EQ(ask(ControlVerb::unforce_variable, "*").code, ErrorCode::ok);
   EXPECT_TRUE(eventually([&] { return client.read("total") != "100"; }));
+}
+
+/// MATIEC knows no EXTENDS.
+class VariablesOfAnHeir : public VariablesOfTranslatedText {};
+INSTANTIATE_TEST_SUITE_P(By, VariablesOfAnHeir, ::testing::Values("strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
+
+TEST_P(VariablesOfAnHeir, AreAlsoThoseOfTheBlocksThatItExtends) {
+  start(R"(
+FUNCTION_BLOCK Counter
+  VAR_INPUT go : BOOL; END_VAR
+  VAR t : ARRAY[1..2] OF INT; END_VAR
+  IF go THEN t[2] := t[2] + 1; END_IF;
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Middle EXTENDS Counter
+  VAR pause : TON; END_VAR
+  pause(IN := go, PT := T#1h);
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Pump EXTENDS Middle
+  VAR hours : LREAL; END_VAR
+  IF go THEN hours := hours + 1.0; t[2] := 7; END_IF;
+END_FUNCTION_BLOCK
+PROGRAM Main
+  VAR one : Pump; many : ARRAY[0..1] OF Pump; END_VAR
+  one();
+END_PROGRAM
+CONFIGURATION cell
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM line WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)");
+  ValueClient client(sandbox);
+  EXPECT_EQ(client.read("line.one.hours"), "0.0");
+  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "line.one.go=TRUE").code, ErrorCode::ok);
+  EXPECT_TRUE(eventually([&] { return client.read("line.one.t[2]") == "7"; }));
+  EXPECT_EQ(client.read("line.one.pause.PT"), "T#0s")
+      << "the body of the block that is extended does not run";
+  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "line.many[1].t[1]=3").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("line.many[1].t[1]"), "3");
 }
 
 }  // namespace
