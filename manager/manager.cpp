@@ -149,7 +149,7 @@ Result<void> Manager::set_up() {
   pool_ = std::move(pool);
   PLCHOST_TRY_ASSIGN(page_, HostPageWriter::create(host.pool));
   auto signals = reactor_->watch_signals({SIGTERM, SIGINT, SIGHUP}, [this](int signal) {
-    if (signal != SIGHUP) return shut_down();
+    if (signal != SIGHUP) return end(signal);
     reload_->reload_by_signal();
   });
   if (!signals) return signals;
@@ -264,6 +264,7 @@ Result<void> Manager::run() {
 }
 
 void Manager::tick() {
+  service_watchdog_.feed(MonotonicClock::now());
   supervisor_->refresh();
   if (latency_due_) restore_latency();
   if (++ticks_ % kTicksPerTidying == 0) look_after_pool();
@@ -300,8 +301,28 @@ void Manager::restore_latency() {
   for (const std::string& line : *restored) spdlog::info("{}", line);
 }
 
-void Manager::shut_down() {
+void Manager::end(int signal) {
   if (std::exchange(ending_, true)) return;
+  if (signal == SIGTERM) {
+    const auto restarted = is_being_restarted();
+    if (restarted && *restarted) return leave();
+    if (!restarted) {
+      spdlog::warn("the manager cannot see whether it is to be started again, and ends its instances: {}",
+                   restarted.error().describe());
+    }
+  }
+  shut_down();
+}
+
+// As a crash leaves them, but with the operator's last words kept. The next manager adopts them.
+void Manager::leave() {
+  spdlog::info("ending for a restart: the instances run on");
+  reload_->shut_down();
+  notify_service_manager("STOPPING=1");
+  supervisor_->when_kept([this] { reactor_->stop(); });
+}
+
+void Manager::shut_down() {
   spdlog::info("ending: all instances in reverse order of their start");
   reload_->shut_down();
   notify_service_manager("STOPPING=1");

@@ -21,6 +21,7 @@
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/disk_thread.hpp"
 #include "manager/system/reactor.hpp"
+#include "manager/system/service_manager.hpp"
 #include "shm/files/lock_file.hpp"
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/transition_ring.hpp"
@@ -68,7 +69,9 @@ class Manager : private InstanceObserver {
                   std::string_view reason) override;
   void wrong_step(const InstanceStatus& status, std::string_view what) override;
   void gone(std::size_t place, const InstanceConfig& config) override;
+  void end(int signal);
   void shut_down();
+  void leave();
   void clean_up();
   void tick();
   void look_after_pool();
@@ -95,6 +98,7 @@ class Manager : private InstanceObserver {
   std::unique_ptr<CommandServer> command_server_;
   ApiServer api_server_;
   Reactor::Timer tick_;
+  ServiceWatchdog service_watchdog_;
   unsigned ticks_ = 0;
   bool pool_lost_ = false;
   bool latency_due_ = true;  // an instance may have ended without putting back what it held

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # The configuration is changed while instances run: `plcctl reload host` and SIGHUP, told over DDS, to the service manager and in
-# the audit log.
+# the audit log. The service manager hears from the manager's loop as long as that goes round.
 . "$(dirname "$0")/common.sh"
 
 write_host cell "$first_core"
 write_instance cell line1 "$first_core" bottling_line 'share_core = true'
 cp "$cell/cell.toml" "$cell/one.toml"
 write_instance cell line2 "$first_core" packer 'share_core = true'
-export NOTIFY_SOCKET=$cell/notify
+export NOTIFY_SOCKET=$cell/notify WATCHDOG_USEC=400000
 python3 - "$NOTIFY_SOCKET" "$cell/notified" <<'PYTHON' &
 import socket, sys
 listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -69,3 +69,17 @@ plcctl start instance line2
 for _ in $(seq 100); do grep -q "READY=1 STATUS=" "$cell/notified" && break; sleep 0.1; done
 grep -A1 "^RELOADING=1 MONOTONIC_USEC=[0-9]*$" "$cell/notified" | grep -q "^READY=1 STATUS=the configuration" ||
   fail "the service manager is not told: $(cat "$cell/notified")"
+
+# A manager that stands still shows no sign, and its instances run on.
+signs() { grep -c "^WATCHDOG=1$" "$cell/notified"; }
+more_signs_than() { [ "$(signs)" -gt "$1" ]; }
+until_true 20 more_signs_than 2
+kill -STOP "${managers[0]}"
+for _ in $(seq 100); do grep -q "^State:.*T" "/proc/${managers[0]}/status" && break; sleep 0.1; done
+sleep 0.2 # what it said before has come
+still=$(signs)
+sleep 1
+[ "$(signs)" = "$still" ] || fail "a manager that stands still shows that it goes round"
+kill -CONT "${managers[0]}"
+until_true 20 more_signs_than "$still"
+[ "$(pid_of line1)" = "$line1" ] || fail "line1 was restarted"
