@@ -143,7 +143,7 @@ TEST_F(HostClockAsReference, IsTaiOnlyIfTheKernelKnowsIt) {
     return;
   }
   EXPECT_TRUE(becomes(ClockState::free_running));
-  EXPECT_THAT(std::string(clock().problem.view()), HasSubstr("the kernel's TAI offset is 0"));
+  EXPECT_TRUE(tells("the kernel's TAI offset is 0")) << clock().problem.view();
 }
 
 }  // namespace
