@@ -76,7 +76,7 @@ more_signs_than() { [ "$(signs)" -gt "$1" ]; }
 until_true 20 more_signs_than 2
 kill -STOP "${managers[0]}"
 for _ in $(seq 100); do grep -q "^State:.*T" "/proc/${managers[0]}/status" && break; sleep 0.1; done
-sleep 0.2 # what it said before has come
+sleep 0.2 # its last words have come
 still=$(signs)
 sleep 1
 [ "$(signs)" = "$still" ] || fail "a manager that stands still shows that it goes round"
