@@ -21,16 +21,16 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   refresh();  // the present decision rests on it
   if (shutting_down_) return refuse(ErrorCode::unavailable, "the manager is shutting down");
   if (auto good = check_argument(checked); !good) return refuse(good.error().code, good.error().describe());
-  if (operation_) {
-    return refuse(ErrorCode::busy, fmt::format("instance '{}' is busy with '{}'; try again when it is done",
-                                               config_.name, to_string(operation_->request.verb)));
-  }
   if (removed_ && checked.verb != ControlVerb::stop) {
     return refuse(
         ErrorCode::wrong_state,
         fmt::format("'{}' was removed from the configuration: it runs until it is stopped; put it back "
                     "into the file and reload that for anything else",
                     config_.name));
+  }
+  if (!makes_room_for(checked.verb)) {
+    return refuse(ErrorCode::busy, fmt::format("instance '{}' is busy with '{}'; try again when it is done",
+                                               config_.name, to_string(operation_->request.verb)));
   }
   spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
   operation_ = Operation{.request = std::move(checked), .reply = std::move(reply)};
@@ -229,7 +229,8 @@ void ManagedInstance::forward() {
   const auto number = send_limited(operation_->request.verb);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
-  host_.set_timer(after(limit_of(operation_->request.verb)));
+  operation_->until = after(limit_of(operation_->request.verb));
+  host_.set_timer(operation_->until);
   if (operation_->request.verb == ControlVerb::stop) {
     set_state(Phase::up, InstanceState::stopping, problem_when_up());
   }
@@ -297,9 +298,13 @@ void ManagedInstance::finish(ErrorCode code, const std::string& text) {
   }
   remember();
   const std::string ended = ended_forces_text(std::exchange(ended_forces_, 0));
-  if (code == ErrorCode::ok) return tell_when_kept(done, text, ended);
-  done.reply(ControlReply{
-      .number = done.request.number, .code = code, .text = ended.empty() ? text : text + "; " + ended});
+  if (code == ErrorCode::ok) {
+    tell_when_kept(done, text, ended);
+  } else {
+    done.reply(ControlReply{
+        .number = done.request.number, .code = code, .text = ended.empty() ? text : text + "; " + ended});
+  }
+  resume_aside();
 }
 
 }  // namespace plchost

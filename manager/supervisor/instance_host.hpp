@@ -26,6 +26,8 @@ class InstanceHost {
   [[nodiscard]] virtual Result<int> adopt() = 0;
   /// Sends a request to the process, over a connection that is made when it is first needed; then on_reply().
   [[nodiscard]] virtual Result<void> request(const ControlRequest& request) = 0;
+  /// Requests that the process has not taken yet are void: it never does.
+  virtual void forget_requests() = 0;
   /// Signals the process, if there is one.
   virtual void signal(int signal) = 0;
   /// Calls on_timer() at that time instead of any earlier setting; nothing: not at all.

@@ -59,6 +59,7 @@ void ManagedInstance::release() {
 void ManagedInstance::shut_down() {
   shutting_down_ = true;
   next_ = Next::nothing;
+  if (aside_) end_aside(ErrorCode::unavailable, "the manager is shutting down");
   if (operation_) finish(ErrorCode::unavailable, "the manager is shutting down");
   carry_out(decided({.cause = EndCause::manager_ends}), "");
 }
@@ -85,6 +86,8 @@ void ManagedInstance::on_report(const SetupReport& report) {
 void ManagedInstance::on_reply(const ControlReply& reply) {
   if (operation_ && operation_->step == Step::forwarded && reply.number == operation_->forwarded_number) {
     finish_forwarded(reply);
+  } else if (aside_ && reply.number == aside_->forwarded_number) {
+    end_aside(reply.code, reply.text);
   } else if (phase_ == Phase::adopting) {
     const bool awaited = reply.number == asked_number_;
     if (hear(reply) || awaited) finish_adoption("");

@@ -56,6 +56,10 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // * Nothing is begun after the time limit of its command, also if it waited for the process or for the trial of a file
 //   meanwhile. The process gets the lesser of that limit and limit_of() from now.
 //
+// * A task of a single cycle can halt at a breakpoint. So commands of the debugger and for variables are carried out
+//   beside it, and stop, reset and restart break it off.
+// * A command that the process has not taken when it falls silent is never begun, also if it answers again.
+//
 // Commands: one at a time; another one is answered with busy. A command that changes a process waits until the process
 // is up. The reply comes when the thing is done, when the process ended instead, or at the limit.
 //
@@ -187,6 +191,7 @@ class ManagedInstance : public InstanceEvents {
     ControlReplyFunction reply;
     Step step = Step::until_up;
     std::uint64_t forwarded_number = 0;
+    TimePoint until{};      // the answer to that is awaited
     std::string refused{};  // why what was to be loaded did not come up; empty: it did
   };
 
@@ -213,6 +218,12 @@ class ManagedInstance : public InstanceEvents {
   void apply_loaded_application();
   void take_back_application(const std::string& why);
   void forward_or_wait();
+  // A single cycle, and commands beside it: instance_single_cycle.cpp
+  /// Whether a command of that kind may begin now.
+  [[nodiscard]] bool makes_room_for(ControlVerb verb);
+  /// The single cycle that has made room is the command under way again, if there is one.
+  void resume_aside();
+  void end_aside(ErrorCode code, const std::string& text);
   void forward();
   void finish(ErrorCode code, const std::string& text);
   void look_again();
@@ -365,6 +376,7 @@ class ManagedInstance : public InstanceEvents {
   bool unheard_ = false;   // adopted, and it has said nothing of itself yet
   std::string unadopted_;  // why it is still being adopted after its limit, for the problem text
   std::optional<Operation> operation_;
+  std::optional<Operation> aside_;       // a single cycle that has made room for operation_
   std::int64_t unix_offset_ns_ = 0;      // of the manager's time, taken once
   std::optional<InstanceWish> earlier_;  // as the manager before left it
   std::string unreadable_;               // why it is not known; empty: it is

@@ -89,6 +89,12 @@ Result<void> ProcessHost::request(const ControlRequest& request) {
   return link_.send(encode(request));
 }
 
+// The process takes nothing from a connection whose other end is closed.
+void ProcessHost::forget_requests() {
+  link_watch_.reset();
+  link_.close();
+}
+
 void ProcessHost::signal(int signal) {
   if (!process_) return;
   if (const auto sent = signal_process(*process_, signal); !sent) {

@@ -31,6 +31,7 @@ class ProcessHost : public InstanceHost {
 
   [[nodiscard]] Result<int> spawn(const LaunchOptions& options) override;
   [[nodiscard]] Result<int> adopt() override;
+  void forget_requests() override;
   [[nodiscard]] Result<void> request(const ControlRequest& request) override;
   void signal(int signal) override;
   void set_timer(std::optional<TimePoint> when) override;

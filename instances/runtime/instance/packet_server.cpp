@@ -121,12 +121,13 @@ void PacketServer::serve(const Take& take) {
   const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
   for (int i = 0; i < count; ++i) {
     const int fd = events.at(static_cast<std::size_t>(i)).data.fd;
+    const bool hung_up = (events.at(static_cast<std::size_t>(i)).events & EPOLLHUP) != 0;
     if (fd == listener_.fd()) {
       accept_all();
     } else if (const auto found = connections_.find(fd); found != connections_.end()) {
       serving_ = found->second.id;
       serving_over_ = false;
-      if (!serve_one(found->second, take)) connections_.erase(found);
+      if (hung_up || !serve_one(found->second, take)) connections_.erase(found);
       serving_ = 0;
     }
   }

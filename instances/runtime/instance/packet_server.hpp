@@ -15,7 +15,8 @@
 namespace plchost {
 
 /// A socket of the instance: any number of connections up to a bound, none able to block another. A client
-/// that does not read is dropped. Control thread.
+/// that does not read is dropped. Packets that were not taken before their client closed the connection are
+/// void. Control thread.
 class PacketServer {
  public:
   /// Together they have at most so many connections, for which descriptors are kept free.

@@ -66,6 +66,23 @@ TEST_F(InstanceSocketTest, AnswersAtOnceOrLater) {
   EXPECT_EQ(decode_reply(client.receive().value().value())->number, 1U);
 }
 
+TEST_F(InstanceSocketTest, CarriesOutNoRequestWhoseClientHasGone) {
+  int carried_out = 0;
+  handler_ = [&](const ControlRequest&, const InstanceSocket::Asker&) -> std::optional<ControlReply> {
+    ++carried_out;
+    return reply("done");
+  };
+  listen();
+  {
+    PacketSocket client = connect();
+    ASSERT_TRUE(client.send(request(1)));
+    sut_->serve();  // takes the connection
+    ASSERT_TRUE(client.send(request(2)));
+  }
+  for (int i = 0; i < 3; ++i) sut_->serve();
+  EXPECT_EQ(carried_out, 0);
+}
+
 // While a request of a connection is worked on, another one of it is answered, and cannot be, because its
 // client reads nothing. A descriptor that is opened then must not get what was meant for that client.
 TEST_F(InstanceSocketTest, ConnectionThatFailsWhileItsRequestIsWorkedOnIsClosedAfterwards) {

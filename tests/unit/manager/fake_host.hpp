@@ -26,6 +26,7 @@ class FakeHost : public InstanceHost {
     requests.push_back(request);
     return {};
   }
+  void forget_requests() override { ++forgotten; }
   void signal(int signal) override { signals.push_back(signal); }
   void set_timer(std::optional<TimePoint> when) override { timer = when; }
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override {
@@ -60,6 +61,7 @@ class FakeHost : public InstanceHost {
   bool can_send = true;
   std::string lost_fault;
   int ended_outputs = 0;
+  int forgotten = 0;
   std::string said;
   int next_pid = 100;
 };

@@ -106,6 +106,58 @@ TEST_F(ManagedLife, PassesASingleCycleOnAndStaysStopped) {
   EXPECT_EQ(state(), InstanceState::stopped);
 }
 
+TEST_F(ManagedLife, CarriesOutCommandsForATaskThatHaltsInASingleCycle) {
+  bring_up_stopped();
+  ask(ControlVerb::single_cycle);
+  const std::uint64_t cycle = host_.requests.back().number;
+  const auto until = host_.timer;
+  for (const ControlVerb verb : {ControlVerb::debug, ControlVerb::write_variable, ControlVerb::force_variable,
+                                 ControlVerb::unforce_variable}) {
+    ask(verb, "continue");
+    EXPECT_EQ(host_.requests.back().verb, verb);
+    answer();
+    EXPECT_EQ(take_reply().code, ErrorCode::ok);
+    EXPECT_EQ(host_.timer, until) << "the cycle has its own limit";
+  }
+  ask(ControlVerb::set_scheduler, "CmpSchedule");
+  EXPECT_EQ(take_reply().code, ErrorCode::busy);
+  ask(ControlVerb::debug, "continue");
+  sut().on_reply({.number = cycle, .code = ErrorCode::ok, .text = ""});
+  EXPECT_EQ(take_reply().code, ErrorCode::ok) << "of the cycle";
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok) << "of the debugger";
+}
+
+TEST_F(ManagedLife, BreaksASingleCycleOffForAStopAndAReset) {
+  for (const ControlVerb verb : {ControlVerb::stop, ControlVerb::reset, ControlVerb::restart}) {
+    make();
+    bring_up_stopped();
+    ask(ControlVerb::single_cycle);
+    show(ApplicationState::single_cycle);
+    ask(verb);
+    const auto broken = take_reply();
+    EXPECT_EQ(broken.code, ErrorCode::wrong_state);
+    EXPECT_EQ(broken.text, fmt::format("broken off by '{}'", to_string(verb)));
+    if (verb == ControlVerb::stop) {
+      EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop) << "its tasks are within their cycles";
+      answer();
+    } else {
+      sut().on_exit(exited_with(0));
+      report_ready();
+    }
+    EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  }
+}
+
+TEST_F(ManagedLife, AnswersASingleCycleAndTheCommandBesideItWhenTheProcessEnds) {
+  bring_up_stopped();
+  ask(ControlVerb::single_cycle);
+  ask(ControlVerb::write_variable, "n=1");
+  sut().on_exit(killed_by(SIGKILL));
+  EXPECT_EQ(replies_.size(), 2U);
+  for (const ControlReply& reply : replies_) EXPECT_NE(reply.code, ErrorCode::ok);
+}
+
 TEST_F(ManagedLife, GivesAnEndingProcessTheTimeOfBothPhases) {
   bring_up();
   ask(ControlVerb::reset);

@@ -139,6 +139,26 @@ class SilentProcess : public ManagedInstanceTest {
   }
 };
 
+TEST_F(SilentProcess, NeverBeginsACommandThatItHadNotTaken) {
+  bring_up();
+  beat();
+  ask(ControlVerb::force_variable, "n=9");
+  EXPECT_EQ(host_.forgotten, 0);
+  fall_silent();
+  EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
+  EXPECT_EQ(host_.forgotten, 1);
+}
+
+TEST_F(SilentProcess, AnswersASingleCycleAndTheCommandBesideIt) {
+  bring_up_stopped();
+  beat();
+  ask(ControlVerb::single_cycle);
+  ask(ControlVerb::debug, "continue");
+  fall_silent();
+  EXPECT_EQ(replies_.size(), 2U);
+  for (const ControlReply& reply : replies_) EXPECT_EQ(reply.code, ErrorCode::timed_out);
+}
+
 TEST_F(SilentProcess, IsInExceptionAndLeftAlone) {
   bring_up_and_fall_silent();
   EXPECT_THAT(problem(), HasSubstr("its control thread has not answered for 3 s"));
