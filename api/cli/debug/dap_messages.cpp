@@ -15,32 +15,44 @@ namespace {
 
 constexpr std::string_view kHeadEnd = "\r\n\r\n";
 constexpr std::string_view kLengthKey = "content-length:";
+constexpr std::string_view kTypeKey = "content-type:";
 
 std::unexpected<Error> not_dap(std::string_view what) {
   return failure(ErrorCode::corrupt, fmt::format("no message of the Debug Adapter Protocol: {}", what));
 }
 
-bool begins_with_key(std::string_view line) noexcept {
-  return line.size() >= kLengthKey.size() &&
-         std::ranges::equal(line.substr(0, kLengthKey.size()), kLengthKey,
-                            [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; });
+bool begins_with(std::string_view key, std::string_view line) noexcept {
+  return line.size() >= key.size() && std::ranges::equal(line.substr(0, key.size()), key, [](char a, char b) {
+           return std::tolower(static_cast<unsigned char>(a)) == b;
+         });
 }
 
-// The length that the head says.
+Result<std::size_t> length_of(std::string_view line) {
+  line.remove_prefix(kLengthKey.size());
+  while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
+  std::size_t length = 0;
+  const auto [last, error] = std::from_chars(line.data(), line.data() + line.size(), length);
+  if (error == std::errc{} && last == line.data() + line.size() && length <= DapReader::kMaxBody)
+    return length;
+  return not_dap(fmt::format("'{}' is no length from 0 to {}", shown(line), DapReader::kMaxBody));
+}
+
+// The length that the head says. A page in a browser can send a body of its choice to each port of its
+// machine, but behind a head of HTTP.
 Result<std::size_t> length_in(std::string_view head) {
+  std::optional<std::size_t> length;
   while (!head.empty()) {
     const std::size_t end = std::min(head.find("\r\n"), head.size());
-    auto line = head.substr(0, end);
+    const auto line = head.substr(0, end);
     head.remove_prefix(std::min(end + 2, head.size()));
-    if (!begins_with_key(line)) continue;
-    line.remove_prefix(kLengthKey.size());
-    while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
-    std::size_t length = 0;
-    const auto [last, error] = std::from_chars(line.data(), line.data() + line.size(), length);
-    if (error == std::errc{} && last == line.data() + line.size() && length <= DapReader::kMaxBody)
-      return length;
-    return not_dap(fmt::format("'{}' is no length from 0 to {}", shown(line), DapReader::kMaxBody));
+    if (begins_with(kLengthKey, line)) {
+      PLCHOST_TRY_ASSIGN(length, length_of(line));
+    } else if (!begins_with(kTypeKey, line)) {
+      return not_dap(
+          fmt::format("'{}' is no line of a head: Content-Length and Content-Type are", shown(line)));
+    }
   }
+  if (length) return *length;
   return not_dap("its head has no Content-Length");
 }
 

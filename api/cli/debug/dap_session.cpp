@@ -161,14 +161,22 @@ DapSession::Answer DapSession::attach(const Json& arguments) {
   }
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   tasks_.clear();
+  news_ = {};
+  halted_.clear();
   for (const Json& task : state_.value("tasks", Json::array())) tasks_.push_back(task.value("task", ""));
   if (!remark.empty()) tell("important", remark);
   return Json::object();
 }
 
-void DapSession::remove_of(const std::string& key) {
-  for (const std::uint32_t id : std::exchange(ids_[key], {}))
-    (void)link_.command(fmt::format("delete {}", id));
+Result<void> DapSession::remove_of(const std::string& key) {
+  std::vector<std::uint32_t>& ids = ids_[key];
+  while (!ids.empty()) {
+    const auto done = link_.command(fmt::format("delete {}", ids.back()));
+    // One whose place is gone since an online change is no more.
+    if (!done && done.error().code != ErrorCode::not_found) return std::unexpected(done.error());
+    ids.pop_back();
+  }
+  return {};
 }
 
 Json DapSession::set_one(const std::string& key, const Result<std::string>& place, const Json& wanted) {
@@ -187,7 +195,7 @@ DapSession::Answer DapSession::set_breakpoints(const Json& arguments) {
   const std::string whole = text_in(source, "path");
   const std::string path = whole.empty() ? text_in(source, "name") : whole;
   if (path.empty()) return failure(ErrorCode::invalid_argument, "the source has no path and no name");
-  remove_of(path);
+  PLCHOST_TRY(remove_of(path));
   if (!whole.empty()) paths_[last_name(whole)] = whole;
   const auto file = place_in(last_name(path), "a file");
   Json made = Json::array();
@@ -200,7 +208,7 @@ DapSession::Answer DapSession::set_breakpoints(const Json& arguments) {
 }
 
 DapSession::Answer DapSession::set_function_breakpoints(const Json& arguments) {
-  remove_of(kFunctions);
+  PLCHOST_TRY(remove_of(kFunctions));
   Json made = Json::array();
   for (const Json& wanted : list_in(arguments, "breakpoints"))
     made.push_back(set_one(kFunctions, place_in(text_in(wanted, "name"), "a POU"), wanted));
@@ -248,6 +256,7 @@ DapSession::Answer DapSession::go_on(const std::string& command, const Json& arg
       {"continue", "continue"}, {"next", "next"}, {"stepIn", "step"}, {"stepOut", "out"}};
   PLCHOST_TRY_ASSIGN(const auto task, task_of(arguments));
   PLCHOST_TRY(link_.command(fmt::format("{} {}", words.at(command), task)));
+  halted_.erase(task);
   if (command == "continue") return Json{{"allThreadsContinued", false}};
   return Json::object();
 }
@@ -263,12 +272,28 @@ void DapSession::tell_halt(const Json& task) {
   Json body{{"reason", task.value("reason", "")}, {"threadId", thread}, {"allThreadsStopped", false}};
   if (task.contains("breakpoint")) body["hitBreakpointIds"] = Json::array({task["breakpoint"]});
   event("stopped", std::move(body));
+  halted_.insert(task.value("task", ""));
+}
+
+// A stop, another scheduler and a change of the application let them go.
+void DapSession::tell_those_that_go_on() {
+  for (auto at = halted_.begin(); at != halted_.end();) {
+    const Json* const task = task_in(state_, *at);
+    if (task != nullptr && task->value("state", "") == "halted") {
+      ++at;
+      continue;
+    }
+    const auto thread = std::ranges::find(tasks_, *at) - tasks_.begin() + 1;
+    event("continued", {{"threadId", thread}, {"allThreadsContinued", false}});
+    at = halted_.erase(at);
+  }
 }
 
 Result<void> DapSession::look() {
   if (!link_.attached()) return {};
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   for (const auto& line : news_.lines(state_)) tell(line.is_gap ? "important" : "console", line.text);
+  tell_those_that_go_on();
   for (const Json& task : news_.halts(state_)) tell_halt(task);
   return {};
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,7 +44,8 @@ class DapSession {
   [[nodiscard]] Answer set_breakpoints(const Json& arguments);
   [[nodiscard]] Answer set_function_breakpoints(const Json& arguments);
   [[nodiscard]] Json set_one(const std::string& key, const Result<std::string>& place, const Json& wanted);
-  void remove_of(const std::string& key);
+  /// An error: some of them stay.
+  [[nodiscard]] Result<void> remove_of(const std::string& key);
   [[nodiscard]] Answer threads();
   [[nodiscard]] Answer stack(const Json& arguments);
   [[nodiscard]] Answer scopes(const Json& arguments);
@@ -59,6 +61,7 @@ class DapSession {
   void event(const std::string& name, Json body);
   void tell(const std::string& category, const std::string& text);
   void tell_halt(const Json& task);
+  void tell_those_that_go_on();
 
   DebugLink& link_;
   std::function<void(const Json&)> send_;
@@ -67,6 +70,7 @@ class DapSession {
   Json state_;
   std::vector<std::string> tasks_;  // thread 1 is the first
   DebugNews news_;
+  std::set<std::string> halted_;                           // as the client was told
   std::map<std::string, std::string> paths_;               // of the client, by the last part
   std::map<std::string, std::vector<std::uint32_t>> ids_;  // breakpoints by source, or "" of functions
 };

@@ -125,6 +125,8 @@ Result<void> DebugConsole::list() {
     }
     print_line(text);
   }
+  if (const std::string missing = state_.value("left_out", ""); !missing.empty())
+    print_line(fmt::format("too long to be told: {}", missing));
   return {};
 }
 

@@ -110,6 +110,8 @@ Result<nlohmann::json> DebugLink::state() {
     }
     if (!whole) continue;
     PLCHOST_TRY_ASSIGN(auto state, parsed(text));
+    if (state.value("too_long", false))
+      return failure(ErrorCode::full, "the state of the debugger is too long to be told; delete breakpoints");
     if (number_ == 0 || state.value("session", std::uint64_t{0}) == number_) return state;
     return failure(ErrorCode::wrong_state,
                    "the debug session is over: the instance has ended it, or another "

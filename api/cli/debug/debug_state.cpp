@@ -23,18 +23,21 @@ const Json* task_in(const Json& state, std::string_view name) {
 
 std::vector<DebugNews::Line> DebugNews::lines(const Json& state) {
   std::vector<Line> fresh;
+  const auto miss_until = [&](std::uint64_t number) {
+    if (number <= logged_) return;
+    fresh.push_back(
+        {.text = fmt::format("{} lines of log points came too fast and are missing here", number - logged_),
+         .is_gap = true});
+    logged_ = number;
+  };
   for (const Json& line : state.value("log", Json::array())) {
     const auto number = line.value("number", std::uint64_t{0});
     if (number <= logged_) continue;
-    if (logged_ != 0 && number != logged_ + 1) {
-      fresh.push_back({.text = fmt::format("{} lines of log points came too fast: they are in the log of the "
-                                           "instance only",
-                                           number - logged_ - 1),
-                       .is_gap = true});
-    }
+    miss_until(number - 1);
     logged_ = number;
     fresh.push_back({.text = line.value("text", "")});
   }
+  miss_until(state.value("logged", logged_));
   return fresh;
 }
 

@@ -49,7 +49,10 @@ Result<void> read_commands(DebugConsole& console) {
     }
     std::array<char, 4096> bytes{};
     const ssize_t got = ::read(STDIN_FILENO, bytes.data(), bytes.size());
-    if (got <= 0) return {};
+    if (got <= 0) {
+      if (!pending.empty()) (void)console.obey(pending);  // a last line without an end
+      return {};
+    }
     pending.append(bytes.data(), static_cast<std::size_t>(got));
     for (std::size_t end = pending.find('\n'); end != std::string::npos; end = pending.find('\n')) {
       const std::string line = pending.substr(0, end);

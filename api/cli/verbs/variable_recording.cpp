@@ -79,15 +79,16 @@ int record(CliSession& session, const RecordArguments& arguments) {
   const TimePoint begin = MonotonicClock::now();
   const auto length =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.duration_s));
+  const TimePoint until = arguments.duration_s > 0 ? begin + length : TimePoint::max();
   Result<void> written;
-  const int code =
-      sample_again_and_again(sampler, SampleTimes(arguments.interval_s), [&](const VariableListing& sample) {
-        written = begin_file();
-        if (written) written = recording->add(sample);
-        return written && (arguments.duration_s <= 0 || MonotonicClock::now() - begin < length);
-      });
+  const int code = sample_again_and_again(sampler, SampleTimes(arguments.interval_s), until,
+                                          [&](const VariableListing& sample) {
+                                            written = begin_file();
+                                            if (written) written = recording->add(sample);
+                                            return written.has_value();
+                                          });
   if (!written) return CliSession::fail(written.error());
-  if (file && recording && code == kExitDone)
+  if (file && recording && (code == kExitDone || code == kExitNoAnswer))
     session.say(fmt::format("{} samples in {}", recording->samples(), arguments.file));
   return code;
 }
@@ -98,12 +99,14 @@ TimePoint SampleTimes::after(TimePoint planned, TimePoint now) const noexcept {
   return next_on_grid(planned, now, interval_);
 }
 
-int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times,
+int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times, TimePoint until,
                            const std::function<bool(const VariableListing&)>& use) {
+  constexpr Duration kLastPatience = std::chrono::seconds(1);
+  const TimePoint latest = until == TimePoint::max() ? until : until + kLastPatience;
   bool silent = false;
   bool first = true;
   for (TimePoint next = MonotonicClock::now(); !interrupted();) {
-    const auto sample = sampler.sample();
+    const auto sample = sampler.sample(first ? TimePoint::max() : latest);
     if (sample) {
       silent = false;
       if (!use(*sample)) break;
@@ -113,7 +116,9 @@ int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times,
       (void)CliSession::fail(sample.error());
     }
     first = false;
-    next = times.after(next, MonotonicClock::now());
+    const TimePoint now = MonotonicClock::now();
+    next = times.after(next, now);
+    if (now >= until || next > until) return silent ? kExitNoAnswer : kExitDone;
     sleep_until_interrupted(next);
   }
   return kExitDone;

@@ -23,9 +23,9 @@ class SampleTimes {
   Duration interval_;
 };
 
-/// Takes samples until Ctrl-C, or until `use` returns false; the exit code. A host or an instance that is
-/// started anew is waited for; that is told once.
-[[nodiscard]] int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times,
+/// Takes samples until Ctrl-C, until `use` returns false, or until that time; the exit code. A host or an
+/// instance that is started anew is waited for; that is told once. kExitNoAnswer: it was not back in time.
+[[nodiscard]] int sample_again_and_again(VariableSampler& sampler, const SampleTimes& times, TimePoint until,
                                          const std::function<bool(const VariableListing&)>& use);
 
 /// "record variables", with its verb.

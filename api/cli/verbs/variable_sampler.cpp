@@ -21,9 +21,9 @@ Result<std::vector<plc_VariableRecord>> VariableSampler::all() {
   return variables;
 }
 
-Result<VariableListing> VariableSampler::sample() {
-  PLCHOST_TRY_ASSIGN(
-      auto page, session_.client().value()->list_variables(host_, instance_, query_, session_.deadline()));
+Result<VariableListing> VariableSampler::sample(TimePoint until) {
+  PLCHOST_TRY_ASSIGN(auto page, session_.client().value()->list_variables(
+                                    host_, instance_, query_, std::min(session_.deadline(), until)));
   PLCHOST_TRY(is_whole(page));
   return page;
 }

@@ -20,7 +20,8 @@ class VariableSampler {
   /// All of them, page by page: the values of each page are of one moment.
   [[nodiscard]] Result<std::vector<plc_VariableRecord>> all();
   /// All of them, with their values of one moment. full: they are more than one page holds.
-  [[nodiscard]] Result<VariableListing> sample();
+  /// It is waited for until then at most.
+  [[nodiscard]] Result<VariableListing> sample(TimePoint until = TimePoint::max());
 
  private:
   CliSession& session_;

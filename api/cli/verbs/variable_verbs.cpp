@@ -166,7 +166,7 @@ int watch_variables(CliSession& session, const WatchVariablesArguments& argument
   std::map<std::string, std::string, std::less<>> last;
   std::uint64_t shown = 0;
   const SampleTimes times(arguments.interval_s);
-  return sample_again_and_again(*sampler, times, [&](const VariableListing& sample) {
+  return sample_again_and_again(*sampler, times, TimePoint::max(), [&](const VariableListing& sample) {
     for (const plc_VariableRecord& variable : sample.variables) {
       std::string now = fmt::format("{} {}", dds::text_of(variable.value), variable.forced);
       std::string& before = last[std::string(dds::text_of(variable.name))];

@@ -10,9 +10,15 @@ Result<ValueLink> ValueLink::connect(const std::string& run_directory, const std
 Result<std::vector<ValueReply>> ValueLink::receive() {
   std::vector<ValueReply> replies;
   for (int i = 0; i < kAtOnce; ++i) {
-    PLCHOST_TRY_ASSIGN(const auto packet, socket_.receive());
-    if (!packet) break;
-    PLCHOST_TRY_ASSIGN(auto reply, reader_.take(*packet));
+    const auto packet = socket_.receive();
+    if (!packet && replies.empty()) return std::unexpected(packet.error());
+    if (!packet || !*packet) break;  // the next call tells of the end
+    PLCHOST_TRY_ASSIGN(auto reply, reader_.take(**packet));
+    if (reply && reply->number == 0) {  // about the connection, not a request
+      return failure(reply->code, reply->code == ErrorCode::busy
+                                      ? "other programs have all connections to its values"
+                                      : "it does not understand the API server");
+    }
     if (reply) replies.push_back(*std::move(reply));
   }
   return replies;

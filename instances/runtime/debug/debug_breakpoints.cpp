@@ -157,8 +157,9 @@ void DebugService::collect() {
 void DebugService::take_logs() {
   for (std::size_t i = 0; i < tasks_.size(); ++i) {
     tasks_[i]->take_logs([&](const LogHit& hit) { write_log(hit, name_of(i)); });
-    if (const auto lost = tasks_[i]->take_lost_logs(); lost > 0)
-      spdlog::warn("task '{}': {} more hits of log points were not written", name_of(i), lost);
+    const auto lost = tasks_[i]->take_lost_logs();
+    log_number_ += lost;  // the debugger sees that they are missing
+    if (lost > 0) spdlog::warn("task '{}': {} more hits of log points were not written", name_of(i), lost);
   }
 }
 

@@ -73,6 +73,7 @@ Result<std::string> DebugService::begin_session(bool take, TimePoint now) {
   session_ = ++last_session_;
   seen_ = now;
   log_.clear();
+  log_number_ = 0;
   for (const auto& task : tasks_) (void)task->forget_steps();
   arm();
   spdlog::warn("a debugger attaches: session {}", session_);

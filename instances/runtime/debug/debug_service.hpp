@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "instances/runtime/debug/breakpoint.hpp"
 #include "instances/runtime/debug/debug_task.hpp"
 #include "instances/runtime/debug/declared_pou.hpp"
@@ -104,6 +106,7 @@ class DebugService {
   [[nodiscard]] Result<std::optional<ValuePlace>> find_own_value(std::uint32_t pou,
                                                                  std::string_view name) const;
   [[nodiscard]] ValuePlace place_of(VariableElement element) const;
+  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, std::size_t frames) const;
   [[nodiscard]] std::string remark() const;
   [[nodiscard]] std::string remark_of(const Breakpoint& breakpoint) const;
   void end_session(std::string_view why);

@@ -1,5 +1,8 @@
 // The state of a debug session as its debugger sees it: DebugService::state().
 
+#include <array>
+#include <utility>
+
 #include <nlohmann/json.hpp>
 
 #include "instances/runtime/debug/debug_service.hpp"
@@ -36,52 +39,75 @@ Json frames_of(const Plc_Frame* frame, const PouCollection& pous, std::size_t mo
   return frames;
 }
 
+// `orders`: with what was written behind the place.
+Json json_of(const Breakpoint& breakpoint, const PouCollection& pous, bool orders) {
+  const DeclaredPou& pou = pous.pous()[breakpoint.place.pou];
+  Json one{{"id", breakpoint.id},
+           {"pou", pou.name},
+           {"file", pou.file},
+           {"line", breakpoint.place.line},
+           {"hits", breakpoint.hits->load(std::memory_order_relaxed)}};
+  if (!orders) return one;
+  if (!breakpoint.order.condition.empty()) one["condition"] = breakpoint.order.condition;
+  if (!breakpoint.order.hits.empty()) one["hit_rule"] = breakpoint.order.hits;
+  if (!breakpoint.order.log.empty()) one["log"] = breakpoint.order.log;
+  return one;
+}
+
+/// The parts of a state that is too long otherwise. Halts are told in each.
+struct Detail {
+  std::size_t frames;
+  bool log;
+  bool orders;
+  bool breakpoints;
+  const char* left_out;
+};
+constexpr std::array kDetails{
+    Detail{DebugService::kMostFrames, true, true, true, ""}, Detail{4, true, true, true, ""},
+    Detail{4, false, false, true, "conditions and texts of breakpoints, and lines of log points"},
+    Detail{1, false, false, false, "all breakpoints, and lines of log points"}};
+
 }  // namespace
 
+nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frames) const {
+  const DebugTask& task = *tasks_[number];
+  const auto halt = task.halt();
+  Json one{{"task", name_of(number)}, {"state", halt ? "halted" : task.ignored() ? "ignored" : "runs"}};
+  if (task.halts() > 0) {
+    one["halts"] = task.halts();
+    one["halted_ms"] = task.halted_for() / std::chrono::milliseconds(1);
+    one["releases_halted"] = task.task().releases_passed();
+  }
+  if (!halt && (task.is_to_pause() || task.steps())) one["state"] = "steps";
+  if (!halt) return one;
+  one["halt"] = halt->number;
+  one["reason"] = reason_text(halt->reason);
+  if (halt->breakpoint != 0) one["breakpoint"] = halt->breakpoint;
+  one["stack"] = frames_of(halt->frame, program_.pous(), frames);
+  return one;
+}
+
 std::string DebugService::state(std::size_t most) const {
-  const PouCollection& pous = program_.pous();
   const auto dump = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
-  for (const std::size_t frames : {kMostFrames, std::size_t{4}, std::size_t{1}}) {
+  for (const Detail& detail : kDetails) {
     Json tasks = Json::array();
-    for (std::size_t i = 0; i < tasks_.size(); ++i) {
-      const DebugTask& task = *tasks_[i];
-      const auto halt = task.halt();
-      Json one{{"task", name_of(i)}, {"state", halt ? "halted" : task.ignored() ? "ignored" : "runs"}};
-      if (task.halts() > 0) {
-        one["halts"] = task.halts();
-        one["halted_ms"] = task.halted_for() / std::chrono::milliseconds(1);
-        one["releases_halted"] = task.task().releases_passed();
-      }
-      if (!halt && (task.is_to_pause() || task.steps())) one["state"] = "steps";
-      if (halt) {
-        one["halt"] = halt->number;
-        one["reason"] = reason_text(halt->reason);
-        if (halt->breakpoint != 0) one["breakpoint"] = halt->breakpoint;
-        one["stack"] = frames_of(halt->frame, pous, frames);
-      }
-      tasks.push_back(std::move(one));
-    }
+    for (std::size_t i = 0; i < tasks_.size(); ++i) tasks.push_back(state_of_task(i, detail.frames));
     Json breakpoints = Json::array();
     for (const auto& breakpoint : breakpoints_) {
-      const DeclaredPou& pou = pous.pous()[breakpoint->place.pou];
-      Json one{{"id", breakpoint->id},
-               {"pou", pou.name},
-               {"file", pou.file},
-               {"line", breakpoint->place.line},
-               {"hits", breakpoint->hits->load(std::memory_order_relaxed)}};
-      if (!breakpoint->order.condition.empty()) one["condition"] = breakpoint->order.condition;
-      if (!breakpoint->order.hits.empty()) one["hit_rule"] = breakpoint->order.hits;
-      if (!breakpoint->order.log.empty()) one["log"] = breakpoint->order.log;
-      breakpoints.push_back(std::move(one));
+      if (detail.breakpoints) breakpoints.push_back(json_of(*breakpoint, program_.pous(), detail.orders));
     }
     Json log = Json::array();
-    for (const LogLine& line : log_) log.push_back({{"number", line.number}, {"text", line.text}});
+    for (const LogLine& line : log_) {
+      if (detail.log) log.push_back({{"number", line.number}, {"text", line.text}});
+    }
     std::string text = dump({{"session", session_},
                              {"halt_all", halt_all_},
                              {"suspended", suspended_},
                              {"tasks", std::move(tasks)},
                              {"breakpoints", std::move(breakpoints)},
-                             {"log", std::move(log)}});
+                             {"log", std::move(log)},
+                             {"logged", log_number_},
+                             {"left_out", detail.left_out}});
     if (text.size() <= most) return text;
   }
   return dump({{"session", session_}, {"too_long", true}});

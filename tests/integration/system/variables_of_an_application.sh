@@ -81,6 +81,26 @@ is "$(head -n 1 "$cell/record.csv")" "time,time_unix_ns,consistent,fast.count,fa
 [ "$(wc -l <"$cell/record.csv")" -gt 5 ] || fail "$(cat "$cell/record.csv")"
 awk -F, 'NR > 1 && $4 * 2 != $5 { exit 1 }' "$cell/record.csv" || fail "two values of different cycles: $(cat "$cell/record.csv")"
 
+echo "- a recording ends in time, and says that the host was silent then"
+plcctl record variables line1 line.total --interval 0.02 --duration 3 --file "$cell/silent.csv" 2>"$cell/silent.txt" &
+recorder=$!
+until_true 10 test -s "$cell/silent.csv"
+server=$(pgrep -P "${managers[-1]}" -x plchost-dds)
+kill -STOP "$server"
+code=0
+wait "$recorder" || code=$?
+kill -CONT "$server"
+is "$code" 3 || fail "exit code $code of a recording: $(cat "$cell/silent.txt")"
+until_true 20 state_is line1 running
+
+echo "- a command that its process has not begun before the answer is never carried out"
+stopped=$(instance line1 pid)
+kill -STOP "$stopped"
+refused "it is in exception now" plcctl force variable line1 line.total=9
+kill -CONT "$stopped"
+until_true 20 state_is line1 running
+is "$(forces)" "" || fail "a force that was refused holds: $(plcctl list forces)"
+
 echo "- a reset ends forces, and says so"
 plcctl force variable line1 line.total=7
 is "$(plcctl reset instance line1)" "line1: reset, and stopped; 1 force ended" || fail "the answer of a reset"

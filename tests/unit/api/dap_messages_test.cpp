@@ -34,7 +34,7 @@ std::string fault_of(const std::string& bytes) {
 }
 
 TEST(DapMessages, AreReadFromAnyPiecesOfThem) {
-  const std::string bytes = packet(R"({"seq":1})") + "content-length:9\r\nX: y\r\n\r\n{\"seq\":2}";
+  const std::string bytes = packet(R"({"seq":1})") + "content-length:9\r\ncontent-type: a\r\n\r\n{\"seq\":2}";
   for (std::size_t piece = 1; piece <= bytes.size(); ++piece) {
     DapReader sut;
     std::string seen;
@@ -56,12 +56,17 @@ TEST(DapMessages, AreReadAsTheyAreWritten) {
 }
 
 TEST(DapMessages, HaveALengthWithinBounds) {
-  EXPECT_THAT(fault_of("GET / HTTP/1.1\r\n\r\n"), HasSubstr("no Content-Length"));
+  EXPECT_THAT(fault_of("Content-Type: a\r\n\r\n"), HasSubstr("no Content-Length"));
   for (const std::string length : {"", "-1", "1x", "0x10", "1048577", "99999999999999999999"})
     EXPECT_THAT(fault_of("Content-Length: " + length + "\r\n\r\n"), HasSubstr("from 0 to 1048576")) << length;
   EXPECT_EQ(fault_of("Content-Length: 1048576\r\n\r\n"), "") << "the rest is to come";
   EXPECT_EQ(fault_of(std::string(DapReader::kMaxHead, 'x')), "");
   EXPECT_THAT(fault_of(std::string(DapReader::kMaxHead + 1, 'x')), HasSubstr("longer than 1024 bytes"));
+}
+
+TEST(DapMessages, AreNoneOfAPageInABrowser) {
+  EXPECT_THAT(fault_of("POST / HTTP/1.1\r\nHost: 127.0.0.1:4711\r\nContent-Length: 2\r\n\r\n{}"),
+              HasSubstr("'POST / HTTP/1.1' is no line of a head"));
 }
 
 TEST(DapMessages, AreObjectsOfFewLevels) {

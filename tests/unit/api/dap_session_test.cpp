@@ -131,6 +131,43 @@ TEST_F(DapSessionTest, ShowsASourceByThePathThatItsClientHasForIt) {
   EXPECT_EQ(shown_path(), "/src/a.st") << "an editor opens only a whole path";
 }
 
+TEST_F(DapSessionTest, KeepsBreakpointsThatTheInstanceDoesNotDelete) {
+  const auto set = [&](const json& breakpoints) {
+    return answer("setBreakpoints", {{"source", {{"path", "/src/a.st"}}}, {"breakpoints", breakpoints}});
+  };
+  EXPECT_TRUE(set(json::array({{{"line", 7}}}))["success"]);
+  instance_.busy = true;
+  EXPECT_FALSE(set(json::array())["success"]) << "the client must not believe that they are gone";
+  instance_.busy = false;
+  EXPECT_TRUE(set(json::array())["success"]);
+  EXPECT_EQ(instance_.commands.back(), "delete 1");
+}
+
+TEST_F(DapSessionTest, TellsThatATaskGoesOnWhichItsClientHasNotLetGo) {
+  sent_.clear();
+  ASSERT_TRUE(sut_.look());
+  ASSERT_EQ(sent_.size(), 1U);
+  EXPECT_EQ(sent_[0]["event"], "stopped");
+  sent_.clear();
+  instance_.tasks[0]["state"] = "runs";  // as after a change of the scheduler
+  ASSERT_TRUE(sut_.look());
+  ASSERT_EQ(sent_.size(), 1U);
+  EXPECT_EQ(sent_[0]["event"], "continued");
+  EXPECT_EQ(sent_[0]["body"]["threadId"], 1);
+  sent_.clear();
+  ASSERT_TRUE(sut_.look());
+  EXPECT_THAT(sent_, IsEmpty()) << "once";
+}
+
+TEST_F(DapSessionTest, TellsItsClientNothingOfATaskThatItHasLetGoItself) {
+  ASSERT_TRUE(sut_.look());
+  (void)ask("continue", {{"threadId", 1}});
+  instance_.tasks[0]["state"] = "runs";
+  sent_.clear();
+  ASSERT_TRUE(sut_.look());
+  EXPECT_THAT(sent_, IsEmpty());
+}
+
 TEST_F(DapSessionTest, SetsFunctionBreakpointsByTheirNames) {
   const json wanted = {{"breakpoints", json::array({{{"name", " Main "}, {"condition", "n > 5"}}})}};
   EXPECT_TRUE(ask("setFunctionBreakpoints", wanted)["breakpoints"][0]["verified"]);

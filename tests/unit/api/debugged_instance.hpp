@@ -30,6 +30,7 @@ struct DebuggedInstance {
   std::vector<plc_VariableRecord> variables;
   std::vector<std::string> commands;  ///< that came, without the number of the session
   std::vector<std::string> written;   ///< NAME=VALUE
+  bool busy = false;                  ///< it refuses commands
 
   /// Each variable to the value that it has; of arrays some elements.
   void force_all() {
@@ -68,6 +69,7 @@ struct DebuggedInstance {
       return std::string();
     }
     if (argument.starts_with("attach")) return std::string(R"({"session":1})");
+    if (busy) return failure(ErrorCode::busy, "it is busy");
     commands.push_back(argument.substr(argument.find(' ') + 1));
     return std::string(R"({"id":1,"line":7})");
   }
