@@ -436,10 +436,10 @@ static __inline__ int plc_image_map(plc_image* image) {
   int error = 0;
   if (fstat(image->descriptor, &status) != 0) return errno;
   if (!S_ISREG(status.st_mode)) return EPROTO;
-  if (status.st_size == 0) {
-    (void)fchmod(image->descriptor, 0660); /* under any umask */
-    if (ftruncate(image->descriptor, (off_t)image->mapped) != 0) return errno;
-    /* No memory is told now, not by SIGBUS in a cycle. */
+  if (status.st_size == 0) (void)fchmod(image->descriptor, 0660); /* under any umask */
+  if (status.st_size != 0 && (unsigned long)status.st_size != image->mapped) return EPROTO;
+  /* No memory is told now, not by SIGBUS in a cycle. Also of a file that somebody has made long, and left. */
+  if ((unsigned long)status.st_blocks * 512u < image->mapped) {
     error = posix_fallocate(image->descriptor, 0, (off_t)image->mapped);
     if (error != 0) return error;
     if (fstat(image->descriptor, &status) != 0) return errno;
@@ -469,7 +469,7 @@ static __inline__ void plc_image_tell_nothing(const plc_image* image) {
 /*
  * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno. EINVAL: no name, or size.
  * ENAMETOOLONG. EPROTO: there is another kind of memory, another size, or the version of another header. Then
- * remove the file while no program uses it. EBUSY: it has a writer already. Others: those of open, ftruncate,
+ * remove the file while no program uses it. EBUSY: it has a writer already. Others: those of open,
  * posix_fallocate and mmap. Set-up.
  */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,

@@ -167,7 +167,7 @@ static __inline__ int plc_reference_clock_is_one(const plc_reference_clock* cloc
 
 /*
  * Opens the record, or makes it (mode 0660). 0, or an errno: ENAMETOOLONG; EPROTO: there is another kind of
- * memory, or another version; those of open, ftruncate, posix_fallocate and mmap. Set-up.
+ * memory, or another version; those of open, posix_fallocate and mmap. Set-up.
  */
 static __inline__ int plc_reference_clock_open(const char* pool, const char* name,
                                                plc_reference_clock** clock) {
@@ -182,14 +182,12 @@ static __inline__ int plc_reference_clock_open(const char* pool, const char* nam
   descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0660);
   if (descriptor < 0) return errno;
   if (fstat(descriptor, &status) != 0) error = errno;
-  if (error == 0 && status.st_size == 0) {
-    (void)fchmod(descriptor, 0660); /* under any umask */
-    if (ftruncate(descriptor, (off_t)sizeof(plc_reference_clock)) != 0) error = errno;
-    /* No memory is told now, not by SIGBUS in a cycle. */
-    if (error == 0) error = posix_fallocate(descriptor, 0, (off_t)sizeof(plc_reference_clock));
-  } else if (error == 0 && status.st_size != (off_t)sizeof(plc_reference_clock)) {
+  if (error == 0 && status.st_size == 0) (void)fchmod(descriptor, 0660); /* under any umask */
+  if (error == 0 && status.st_size != 0 && status.st_size != (off_t)sizeof(plc_reference_clock))
     error = EPROTO;
-  }
+  /* No memory is told now, not by SIGBUS in a cycle. Also of a file that somebody has made long, and left. */
+  if (error == 0 && status.st_blocks == 0)
+    error = posix_fallocate(descriptor, 0, (off_t)sizeof(plc_reference_clock));
   if (error == 0) {
     memory = mmap(NULL, sizeof(plc_reference_clock), PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
     if (memory == MAP_FAILED) {

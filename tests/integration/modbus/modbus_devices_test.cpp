@@ -150,6 +150,26 @@ TEST(ModbusDevices, TheSafeStateOfAPlcIsNoSilence) {
   EXPECT_EQ(peer.holding(7), 8);
 }
 
+TEST(ModbusDevices, APlcThatDiesInItsSilenceSwitchesNothingOnAgain) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99;
+  })) << sut.log();
+  ASSERT_TRUE(eventually([&] { return peer.holding(7) == 0; }));
+  plant.die_and_keep();
+  const int requests = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
+  EXPECT_EQ(peer.holding(7), 0);
+  EXPECT_TRUE(eventually([&] {
+    plant.put_out(0, 98);
+    return peer.holding(7) == 98;
+  })) << "of its next process";
+}
+
 // The end of a host removes its images.
 TEST(ModbusDevices, TheSafeStateHoldsWhenTheImageIsGoneUntilAnotherPlcWrites) {
   Plant plant;

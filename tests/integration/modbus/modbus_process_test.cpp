@@ -39,6 +39,46 @@ TEST(ModbusProcess, TheEndPutsOutputsAndInputsIntoTheirSafeState) {
   EXPECT_EQ(plant.status(56).age_ms, modbus::kNeverRead);
 }
 
+TEST(ModbusProcess, TheEndSetsTheOutputsThatADeviceTakesThoughItRefusesOthers) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  std::string text = device(port);
+  constexpr std::string_view kWrite = "[[device.write]]\n";
+  text.insert(text.find(kWrite),
+              fmt::format("{}kind = \"holding_register\"\naddress = {}\nimage = \"t.out\"\n", kWrite,
+                          ModbusPeer::kRegisters));
+  ModbusProgram sut(plant, plant.write(text));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99;
+  })) << sut.log();
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  EXPECT_EQ(peer.holding(7), 0);
+  EXPECT_TRUE(sut.logged("its outputs from address 300 were not set to zero")) << sut.log();
+  EXPECT_FALSE(sut.logged("its outputs from address 7 were not set to zero")) << sut.log();
+}
+
+TEST(ModbusProcess, TheEndReachesADeviceBetweenTwoAttemptsToConnect) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  std::string text = device(port);
+  text.replace(text.find("reconnect_ms = 100"), 18, "reconnect_ms = 3600000");
+  text.replace(text.find("reconnect_max_ms = 200"), 22, "reconnect_max_ms = 3600000");
+  ModbusProgram sut(plant, plant.write(text));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return peer.holding(7) == 99;
+  })) << sut.log();
+  peer.set(Mode::garbage);
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); })) << sut.log();
+  peer.set(Mode::normal);
+  EXPECT_EQ(peer.holding(7), 99);
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  EXPECT_EQ(peer.holding(7), 0) << sut.log();
+}
+
 // The response would be waited for until its timeout.
 TEST(ModbusProcess, TheEndWaitsForNoStalledDevice) {
   Plant plant;
@@ -51,7 +91,7 @@ TEST(ModbusProcess, TheEndWaitsForNoStalledDevice) {
   const auto begin = MonotonicClock::now();
   EXPECT_EQ(sut.end(SIGTERM), 0);
   RecordProperty("ms", static_cast<int>((MonotonicClock::now() - begin) / 1ms));
-  EXPECT_FALSE(sut.logged("timed out")) << sut.log();
+  EXPECT_FALSE(sut.logged("is lost: Connection timed out")) << sut.log();
   EXPECT_TRUE(sut.logged("plchost-modbus: ended"));
 }
 

@@ -79,6 +79,11 @@ void Plant::put_out(unsigned offset, std::uint16_t word) {
   plc_image_write(&outputs_, bytes.data());
 }
 
+void Plant::die_and_keep() {
+  plc_image_hold(&outputs_, 1);
+  plc_image_tell(&outputs_, PLC_IMAGE_STATE_ENDED, 0);
+}
+
 void Plant::show_safe(unsigned state, std::uint16_t word, bool holds) {
   std::array<std::uint8_t, kSize> bytes{};
   std::memcpy(bytes.data(), &word, sizeof word);

@@ -41,6 +41,8 @@ class Plant {
   /// Tells this state of the PLC (PLC_IMAGE_STATE_...), and shows a safe image with this word at byte 0.
   /// `holds`: its settings name a safe state.
   void show_safe(unsigned state, std::uint16_t word, bool holds = true);
+  /// The death of a PLC whose settings keep its outputs, as the manager tells it.
+  void die_and_keep();
   /// A sign of the PLC.
   void beat() { plc_image_beat(&outputs_); }
 

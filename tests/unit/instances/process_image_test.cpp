@@ -4,11 +4,13 @@
 #include <atomic>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <numeric>
 #include <string>
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "instances/runtime/memory/output_image.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
@@ -253,6 +255,20 @@ TEST_F(OpenedImage, IsMadeByWhoeverComesFirstAndHasOneWriter) {
   EXPECT_NE(plc_image_gone(&reader, pool.c_str(), "io"), 0);
   plc_image_close(&reader);
   plc_image_close(&writer);
+}
+
+// As of a maker that was told that there is no memory. With none, each access to it would be a SIGBUS.
+TEST_F(OpenedImage, OfAFileThatWasLeftWithoutMemoryHasItBeforeItIsUsed) {
+  const std::string path = "/dev/shm/" + pool + ".memory.left";
+  std::ofstream(path).close();
+  std::filesystem::resize_file(path, plc_image_bytes(64));
+  plc_image sut{};
+  ASSERT_EQ(plc_image_open(pool.c_str(), "left", 64, PLC_IMAGE_WRITE, &sut), 0);
+  struct stat file{};
+  ASSERT_EQ(::stat(path.c_str(), &file), 0);
+  EXPECT_GE(static_cast<unsigned long>(file.st_blocks) * 512, plc_image_bytes(64));
+  plc_image_close(&sut);
+  std::filesystem::remove(path);
 }
 
 TEST_F(OpenedImage, OfABadNameOrSizeIsRefused) {

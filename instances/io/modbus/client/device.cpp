@@ -15,6 +15,8 @@ namespace {
 
 // So that the outputs of several maps get their safe state in the time that the end of the process has.
 constexpr std::chrono::milliseconds kSafeStateTimeout{300};
+// For the connection, and again for the response, of one that did not answer last.
+constexpr std::chrono::milliseconds kLastAttempt{100};
 
 }  // namespace
 
@@ -76,7 +78,7 @@ LinkResult Device::write_output(Output& output) {
                    (output.map->rewrite > Duration::zero() && now - output.written_at >= output.map->rewrite);
   if (!wanted || !due) return {};
   asked_ = true;
-  auto result = link_.write(config_, *output.map, values, config_.timeout);
+  auto result = link_.write(config_, *output.map, values);
   output.is_written = result.has_value();
   output.written = values;
   output.written_at = now;
@@ -86,8 +88,11 @@ LinkResult Device::write_output(Output& output) {
 // False: nothing is to be written.
 bool Device::outputs_of(Output& output, MapValues& values) {
   bool silent = false;
-  output.image->look([&](std::span<const std::byte> bytes, Duration silence) {
-    silent = silence >= config_.silent_after;
+  output.image->look([&](std::span<const std::byte> bytes, const OutputImage::Shown& shown) {
+    // A writer that dies in its silence says nothing with that: the outputs are not switched on again.
+    const bool has_died = shown.ended && output.is_silent && output.silent_with == shown.word;
+    silent = has_died || shown.silence >= config_.silent_after;
+    if (silent) output.silent_with = shown.word;
     if (!silent) values.read_from(*output.map, bytes);
   });
   tell_silence(output, silent);
@@ -154,17 +159,20 @@ void Device::report(const LinkFailure* failure) {
   }
 }
 
+// A device that refuses one map, or that did not answer last, may take the others.
 void Device::make_safe() {
-  const bool answers = quality_ == Quality::good || quality_ == Quality::exception;
-  if (config_.when_silent != LossPolicy::zero || !answers) return;
+  if (config_.when_silent != LossPolicy::zero || quality_ == Quality::none) return;
+  const Duration limit = quality_ == Quality::lost ? kLastAttempt : kSafeStateTimeout;
+  bool is_there = true;
   for (const Output& output : outputs_) {
     MapValues zeros;
-    const Duration timeout = std::min(config_.timeout, Duration(kSafeStateTimeout));
-    if (!link_.write(config_, *output.map, zeros, timeout)) {
-      spdlog::warn("device '{}': its outputs from address {} were not set to zero", config_.name,
-                   output.map->address);
-      return;
-    }
+    const Duration timeout = std::min(config_.timeout, limit);
+    const LinkResult written = is_there ? link_.write_at_end(config_, *output.map, zeros, timeout)
+                                        : std::unexpected(LinkFailure{.text = "it does not answer"});
+    if (written) continue;
+    spdlog::warn("device '{}': its outputs from address {} were not set to zero: {}", config_.name,
+                 output.map->address, written.error().text);
+    is_there = written.error().exception != 0;
   }
 }
 

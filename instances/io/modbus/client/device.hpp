@@ -49,7 +49,8 @@ class Device {
     MapValues written;
     bool is_written = false;  ///< since the connection was made
     TimePoint written_at;
-    bool is_silent = true;  ///< its PLC; at first nothing was put out
+    bool is_silent = true;          ///< its PLC; at first nothing was put out
+    std::uint64_t silent_with = 0;  ///< the image that was shown then
   };
 
   [[nodiscard]] LinkResult write_outputs();

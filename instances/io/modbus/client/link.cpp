@@ -70,18 +70,18 @@ void Link::close() noexcept {
   if (std::exchange(is_open_, false)) modbus_close(context_.get());
 }
 
-LinkResult Link::open(const DeviceConfig& device) {
+LinkResult Link::open(const DeviceConfig& device, Limits limits) {
   if (is_open_) return {};
-  if (stop_.is_set()) return failed("this process ends");
-  auto opened = device.serial.empty() ? open_tcp(device) : open_serial(device);
+  if (stop_.is_set() && !limits.at_end) return failed("this process ends");
+  auto opened = device.serial.empty() ? open_tcp(device, limits) : open_serial(device);
   is_open_ = opened.has_value();
   return opened;
 }
 
-LinkResult Link::open_tcp(const DeviceConfig& device) {
+LinkResult Link::open_tcp(const DeviceConfig& device, Limits limits) {
   const auto endpoint = parse_endpoint(device.tcp);
   if (!endpoint) return failed(endpoint.error());
-  auto fd = tcp_connect(*endpoint, MonotonicClock::now() + device.timeout, stop_);
+  auto fd = tcp_connect(*endpoint, MonotonicClock::now() + limits.timeout, limits.at_end ? nullptr : &stop_);
   if (!fd) return failed(fd.error().describe());
   keep_descriptor(fd->get());
   modbus_set_socket(context_.get(), fd->release());
@@ -98,12 +98,12 @@ LinkResult Link::open_serial(const DeviceConfig& device) {
 }
 
 template <class Call>
-LinkResult Link::request(const DeviceConfig& device, Duration timeout, const Call& call) {
+LinkResult Link::request(const DeviceConfig& device, Limits limits, const Call& call) {
   const std::lock_guard lock(turn_);
-  if (auto opened = open(device); !opened) return opened;
+  if (auto opened = open(device, limits); !opened) return opened;
   modbus_t* const context = context_.get();
   modbus_set_slave(context, device.unit);
-  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(timeout).count();
+  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(limits.timeout).count();
   constexpr std::int64_t kSecond = 1'000'000;
   modbus_set_response_timeout(context, static_cast<std::uint32_t>(us / kSecond),
                               static_cast<std::uint32_t>(us % kSecond));
@@ -121,7 +121,7 @@ LinkResult Link::request(const DeviceConfig& device, Duration timeout, const Cal
 
 LinkResult Link::read(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {
   const int count = static_cast<int>(map.count);
-  return request(device, device.timeout, [&](modbus_t* context) {
+  return request(device, {.timeout = device.timeout}, [&](modbus_t* context) {
     switch (map.kind) {
       case RegisterKind::coil:
         return modbus_read_bits(context, map.address, count, values.bits(map.count).data());
@@ -136,11 +136,19 @@ LinkResult Link::read(const DeviceConfig& device, const RegisterMap& map, MapVal
   });
 }
 
+LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {
+  return write(device, map, values, {.timeout = device.timeout});
+}
+
+LinkResult Link::write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
+                              Duration timeout) {
+  return write(device, map, values, {.timeout = timeout, .at_end = true});
+}
+
 // Many devices have only the functions for one register, others only those for several.
-LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
-                       Duration timeout) {
+LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits) {
   const int count = static_cast<int>(map.count);
-  return request(device, timeout, [&](modbus_t* context) {
+  return request(device, limits, [&](modbus_t* context) {
     if (is_bit(map.kind)) {
       const auto bits = values.bits(map.count);
       return count == 1 ? modbus_write_bit(context, map.address, bits[0])

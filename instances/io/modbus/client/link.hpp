@@ -35,9 +35,11 @@ class Link {
 
   /// The time limit is that of the device, for the connection and for the whole response.
   [[nodiscard]] LinkResult read(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
-  /// After the stop it writes only if it is connected.
-  [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
-                                 Duration timeout);
+  [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
+  /// The same with a limit of its own, for a connection that has to be made and for the response. Also after
+  /// the stop.
+  [[nodiscard]] LinkResult write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
+                                        Duration timeout);
 
   /// A thread that waits for a response on TCP gets none any more.
   void interrupt() noexcept;
@@ -48,10 +50,15 @@ class Link {
   };
   Link(modbus_t* context, const StopEvent& stop) : context_(context), stop_(stop) {}
 
+  struct Limits {
+    Duration timeout;
+    bool at_end = false;
+  };
   template <class Call>
-  LinkResult request(const DeviceConfig& device, Duration timeout, const Call& call);
-  LinkResult open(const DeviceConfig& device);
-  LinkResult open_tcp(const DeviceConfig& device);
+  LinkResult request(const DeviceConfig& device, Limits limits, const Call& call);
+  LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
+  LinkResult open(const DeviceConfig& device, Limits limits);
+  LinkResult open_tcp(const DeviceConfig& device, Limits limits);
   LinkResult open_serial(const DeviceConfig& device);
   void close() noexcept;
   void keep_descriptor(int fd) noexcept;

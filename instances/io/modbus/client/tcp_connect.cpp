@@ -27,7 +27,7 @@ bool is_with_itself(int fd) noexcept {
 
 }  // namespace
 
-Result<UniqueFd> tcp_connect(const Endpoint& endpoint, TimePoint deadline, const StopEvent& stop) {
+Result<UniqueFd> tcp_connect(const Endpoint& endpoint, TimePoint deadline, const StopEvent* stop) {
   UniqueFd fd(::socket(endpoint.family(), SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP));
   if (!fd) return failure(ErrorCode::system, "socket", errno);
   if (fd.get() >= FD_SETSIZE) return failure(ErrorCode::full, "too many open files for libmodbus");

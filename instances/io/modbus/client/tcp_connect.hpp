@@ -9,8 +9,8 @@
 namespace plchost::modbus {
 
 /// A connection as libmodbus expects it: non-blocking, without delay of small packets. timed_out: no answer
-/// until `deadline`, or the stop came first.
+/// until `deadline`, or the stop came first; null: no stop counts.
 [[nodiscard]] Result<UniqueFd> tcp_connect(const Endpoint& endpoint, TimePoint deadline,
-                                           const StopEvent& stop);
+                                           const StopEvent* stop);
 
 }  // namespace plchost::modbus

@@ -23,6 +23,16 @@ void OutputImage::refresh() {
   if (image_.read(fresh_)) std::swap(bytes_, fresh_);
 }
 
+OutputImage::Shown OutputImage::shown() const noexcept {
+  const plc_image& image = image_.image();
+  const bool safe = (plc_image_control(&image) & PLC_IMAGE_SHOWS_SAFE) != 0;
+  const std::uint64_t number =
+      __atomic_load_n(safe ? &image.header->safe : &image.header->latest, __ATOMIC_ACQUIRE);
+  return {.silence = Duration(plc_image_silence_ns(&image)),
+          .ended = plc_image_state(&image) == PLC_IMAGE_STATE_ENDED,
+          .word = number << 1U | static_cast<std::uint64_t>(safe)};
+}
+
 void OutputImage::repair() {
   const TimePoint now = MonotonicClock::now();
   if (now < looked_at_ + kLookPause) return;

@@ -23,14 +23,20 @@ class OutputImage {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
-  /// Calls `look` with the bytes that are shown and the time for which their writer is silent. It is silent
-  /// if it runs and publishes nothing, or gives no sign. One that has stopped or ended in order is not: it
-  /// says which outputs hold from then on. Duration::max(): nothing was written yet.
+  struct Shown {
+    /// The time for which the writer is silent: if it runs and publishes nothing, or gives no sign. One that
+    /// has stopped or ended is not: it says, or the manager for it, which outputs hold from then on.
+    /// Duration::max(): nothing was written yet.
+    Duration silence{};
+    bool ended = false;      ///< the writer's process
+    std::uint64_t word = 0;  ///< another one for each image that is shown; 0: none
+  };
+  /// Calls `look` with the bytes that are shown, and a Shown.
   template <class Look>
   void look(const Look& look) {
     const std::lock_guard lock(mutex_);
     refresh();
-    look(std::span<const std::byte>(bytes_), silence());
+    look(std::span<const std::byte>(bytes_), shown());
   }
 
  private:
@@ -42,7 +48,7 @@ class OutputImage {
         fresh_(bytes_.size()) {}
   void refresh();
   void repair();
-  [[nodiscard]] Duration silence() const noexcept { return Duration(plc_image_silence_ns(&image_.image())); }
+  [[nodiscard]] Shown shown() const noexcept;
 
   std::string pool_;
   std::string name_;

@@ -50,8 +50,8 @@ bool ServedMaps::read_part(const Served& served, const Part& part, MapValues& va
     return true;
   }
   bool fresh = false;
-  served.output->look([&](std::span<const std::byte> bytes, Duration silence) {
-    fresh = silent_after_ == Duration::zero() || silence < silent_after_;
+  served.output->look([&](std::span<const std::byte> bytes, const OutputImage::Shown& shown) {
+    fresh = silent_after_ == Duration::zero() || shown.silence < silent_after_;
     if (fresh) get(bytes);
   });
   return fresh;

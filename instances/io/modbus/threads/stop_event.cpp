@@ -29,13 +29,13 @@ bool StopEvent::is_set() const noexcept {
 }
 
 bool StopEvent::wait_until(TimePoint deadline) const noexcept {
-  (void)wait_for(-1, 0, deadline, *this);
+  (void)wait_for(-1, 0, deadline, this);
   return is_set();
 }
 
-bool wait_for(int fd, short events, TimePoint deadline, const StopEvent& stop) noexcept {
-  std::array<pollfd, 2> fds{
-      {{.fd = stop.fd(), .events = POLLIN, .revents = 0}, {.fd = fd, .events = events, .revents = 0}}};
+bool wait_for(int fd, short events, TimePoint deadline, const StopEvent* stop) noexcept {
+  std::array<pollfd, 2> fds{{{.fd = stop == nullptr ? -1 : stop->fd(), .events = POLLIN, .revents = 0},
+                             {.fd = fd, .events = events, .revents = 0}}};
   while (true) {
     const timespec left = to_timespec(std::max(deadline - MonotonicClock::now(), Duration::zero()));
     const int ready = ::ppoll(fds.data(), fds.size(), &left, nullptr);

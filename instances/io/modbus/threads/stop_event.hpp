@@ -22,7 +22,8 @@ class StopEvent {
   UniqueFd fd_;
 };
 
-/// Waits until `fd` has one of `events`; -1: for none. False: the time is over, or the stop came first.
-[[nodiscard]] bool wait_for(int fd, short events, TimePoint deadline, const StopEvent& stop) noexcept;
+/// Waits until `fd` has one of `events`; -1: for none. False: the time is over, or the stop came first;
+/// null: no stop counts.
+[[nodiscard]] bool wait_for(int fd, short events, TimePoint deadline, const StopEvent* stop) noexcept;
 
 }  // namespace plchost::modbus
