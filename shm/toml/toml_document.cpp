@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -61,6 +63,50 @@ std::string_view line_of(std::string_view text, unsigned line) {
   return text.substr(0, text.find('\n'));
 }
 
+/// Looks for keys of so many parts that reading them would take more stack than there is: "a.a.a..." makes a
+/// table within a table for each.
+class KeyDepth {
+ public:
+  static constexpr unsigned kMostParts = 32;
+
+  /// The line of the first one that is too deep; nothing: there is none.
+  static std::optional<unsigned> first_too_deep(std::string_view text) {
+    KeyDepth depth;
+    while (!text.empty()) {
+      if (depth.parts_ > kMostParts) return depth.line_;
+      text.remove_prefix(depth.take(text));
+    }
+    return depth.parts_ > kMostParts ? std::optional(depth.line_) : std::nullopt;
+  }
+
+ private:
+  // How many characters it has taken.
+  std::size_t take(std::string_view text) {
+    const char letter = text.front();
+    if (letter == '"' || letter == '\'') return take_quoted(text, letter);
+    if (letter == '#') return std::min(text.find('\n'), text.size());
+    if (letter == '\n') ++line_;
+    if (letter == '.') ++parts_;
+    if (std::string_view("\n=,{}").contains(letter)) parts_ = 1;
+    return 1;
+  }
+  std::size_t take_quoted(std::string_view text, char quote) {
+    const std::string three(3, quote);
+    const bool is_long = text.starts_with(three);
+    const std::string_view end = is_long ? std::string_view(three) : std::string_view(three).substr(0, 1);
+    std::size_t at = end.size();
+    while (at < text.size() && !text.substr(at).starts_with(end)) {
+      if (text[at] == '\n' && !is_long) return at;  // its fault is told by the parser
+      if (text[at] == '\n') ++line_;
+      at += quote == '"' && text[at] == '\\' ? 2U : 1U;
+    }
+    return std::min(at + end.size(), text.size());
+  }
+
+  unsigned line_ = 1;
+  unsigned parts_ = 1;  // of the key that is being read
+};
+
 }  // namespace
 
 std::string describe(const std::string& file, const ConfigProblem& problem) {
@@ -89,6 +135,13 @@ std::string TomlValue::shown() const {
 }
 
 std::expected<TomlTable, ConfigProblem> parse_toml(std::string_view text) {
+  if (const auto line = KeyDepth::first_too_deep(text)) {
+    return std::unexpected(
+        ConfigProblem{.line = *line,
+                      .text = fmt::format("a key has more than {} parts; no key of plchost has that many",
+                                          KeyDepth::kMostParts),
+                      .column = 0});
+  }
   try {
     return convert_table(toml::parse(text));
   } catch (const toml::parse_error& error) {  // the library is built to say it so

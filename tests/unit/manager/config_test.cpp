@@ -11,6 +11,7 @@
 #include "manager/config/config_table.hpp"
 #include "manager/config/load_config.hpp"
 #include "shm/pages/host_page.hpp"
+#include "shm/toml/toml_document.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -223,6 +224,20 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"peers_no_port", "[dds]\npeers = [\"[fe80::1]:\"]\n", "2", "is not an address"},
         WrongConfig{"peers_type", "[dds]\npeers = [1]\n", "2", "allowed is an array of texts"}),
     [](const auto& test) { return test.param.name; });
+
+TEST(ConfigDepth, IsBoundedBeforeAStackEnds) {
+  std::string parts = "a";
+  for (int i = 0; i < 100'000; ++i) parts += ".a";
+  for (const std::string& deep : {"[" + parts + "]\n", parts + " = 1\n", "x = {" + parts + " = 1}\n"}) {
+    const auto parsed = parse_toml("# one\n" + deep);
+    ASSERT_FALSE(parsed);
+    EXPECT_EQ(parsed.error().line, 2U);
+    EXPECT_THAT(parsed.error().text, testing::HasSubstr("a key has more than 32 parts"));
+  }
+  const std::string dots(1000, '.');
+  EXPECT_TRUE(parse_toml("a = \"" + dots + "\" # " + dots + "\nb = '" + dots + "'\nc = \"\"\"\n" + dots +
+                         "\n\"\"\"\n"));
+}
 
 INSTANTIATE_TEST_SUITE_P(
     Syntax, ConfigRefuses,
