@@ -73,6 +73,9 @@ class MatiecTranslator : public Translator {
     if (!context_.has(compiler) || !words || !context_.open_folder()) return false;
     compiler_ = *std::move(compiler);
     words_ = *std::move(words);
+    std::ranges::move(matiec::taken_names(context_.project, compiler_.library),
+                      std::back_inserter(context_.report.problems));
+    if (!context_.good()) return false;
     joined_.emplace(context_.sources);
     return context_.has(context_.folder().write(std::string(matiec::kJoinedFile), joined_->text())) && run();
   }

@@ -5,9 +5,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <ranges>
 #include <regex>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -69,6 +71,20 @@ std::vector<std::string> words_in(const std::string& file, unsigned line) {
   return words;
 }
 
+void add_pous_in(const fs::path& file, std::set<std::string>& names) {
+  std::ifstream stream(file);
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  const iec::Tokens tokens = iec::tokens_of(text, file);
+  for (std::size_t i = 0; i + 1 < tokens.all.size(); ++i) {
+    if (tokens.all[i].is("FUNCTION") || tokens.all[i].is("FUNCTION_BLOCK"))
+      names.insert(iec::folded(tokens.all[i + 1].text));
+  }
+}
+
+std::string taken_text(std::string_view name) {
+  return fmt::format("'{}' is also a name in the library of iec2c; choose another one", name);
+}
+
 unsigned number_of(const std::ssub_match& match) {
   return static_cast<unsigned>(std::strtoul(match.str().c_str(), nullptr, 10));
 }
@@ -93,6 +109,19 @@ Result<Compiler> find_compiler(const std::string& folder) {
       "PLCHOST_MATIEC");
 }
 
+iec::SourceProblems taken_names(const iec::Project& project, const std::string& library) {
+  std::set<std::string> taken;
+  std::error_code none;  // without the folder iec2c says so
+  for (const fs::directory_entry& entry : fs::directory_iterator(library, none)) {
+    if (entry.path().extension() == ".txt") add_pous_in(entry.path(), taken);
+  }
+  iec::SourceProblems problems;
+  for (const iec::Pou& pou : project.pous) {
+    if (taken.contains(iec::folded(pou.name))) problems.push_back({pou.name_place, taken_text(pou.name)});
+  }
+  return problems;
+}
+
 iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
                                 const iec::Project& project, const std::string& library) {
   static const std::regex form(
@@ -113,8 +142,7 @@ iec::SourceProblems problems_of(std::string_view output, const JoinedSource& sou
     for (const std::string& word : words_in(fs::path(library) / match[1].str(), number_of(match[2]))) {
       const auto declared = std::ranges::find(names, word, &Declared::name);
       if (declared == names.end()) continue;
-      add({declared->place,
-           fmt::format("'{}' is also a name in the library of iec2c; choose another one", word)});
+      add({declared->place, taken_text(word)});
     }
   }
   return problems;

@@ -24,6 +24,10 @@ struct Compiler {
 /// The name of the joined file, in the folder in which iec2c runs.
 inline constexpr std::string_view kJoinedFile = "joined.st";
 
+/// POUs that are called as one of the compiler's library (texts in the folder `library`). iec2c ends at them
+/// without a place.
+[[nodiscard]] iec::SourceProblems taken_names(const iec::Project& project, const std::string& library);
+
 /// The output of iec2c, in the words and places of the sources. Errors in its own library (in the folder
 /// `library`) come from a name of the program that the library has, too: that name is told, where it is
 /// declared.

@@ -277,8 +277,17 @@ iec::SourceProblems refused_names(const iec::Project& project) {
   }
   for (const iec::DeclaredType& type : project.types) names.check(type);
   for (const iec::Configuration& configuration : project.configurations) {
+    names.check(configuration.name, configuration.place);
     names.check(configuration.globals);
-    for (const iec::Resource& resource : configuration.resources) names.check(resource.globals);
+    for (const iec::Resource& resource : configuration.resources) {
+      names.check(resource.name, resource.place);
+      names.check(resource.globals);
+      for (const iec::Task& task : resource.tasks) names.check(task.name, task.place);
+      for (const iec::Program& program : resource.programs) names.check(program.name, program.place);
+      if (project.pou(resource.name) == nullptr) continue;
+      problems.push_back({resource.place, fmt::format("RESOURCE {}: a POU has this name; choose another one",
+                                                      resource.name)});
+    }
   }
   return problems;
 }

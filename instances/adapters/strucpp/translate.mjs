@@ -13,7 +13,7 @@ const kMostElements = 1000; // of an array of function blocks, each with variabl
 
 const folder = resolve(process.argv[2]);
 const { sources } = JSON.parse(readFileSync('order.json', 'utf8'));
-const { compile, discoverStlibs } = await import(pathToFileURL(join(folder, 'dist', 'node', 'index.js')).href);
+const { compile, discoverStlibs, StdFunctionRegistry } = await import(pathToFileURL(join(folder, 'dist', 'node', 'index.js')).href);
 
 const fileNumbers = new Map(sources.map((source, i) => [source.name, i]));
 const lines = sources.map((source) => source.text.split('\n'));
@@ -139,6 +139,7 @@ class Plan {
     this.ast = result.ast;
     this.header = result.headerCode;
     this.remarks = [];
+    this.dropped = new Map(); // arrays with initial values, by their place
     this.classes = this.readClasses();
     this.blocks = new Map(this.ast.functionBlocks.map((block) => [block.name.toUpperCase(), block]));
     this.functions = new Set(this.ast.functions.map((one) => one.name.toUpperCase()));
@@ -201,6 +202,7 @@ class Plan {
       member: member ?? '',
     };
     if (member === undefined && variable.section !== 'external') variable.section = 'other';
+    if (declaration.initialValue?.kind === 'ArrayLiteralExpression') this.dropped.set(`${variable.place}`, variable);
     const element = declaration.type.elementTypeName?.toUpperCase();
     const dimensions = declaration.type.arrayDimensions;
     if (element !== undefined && dimensions !== undefined && this.isBlock(element)) return this.elements(variable, element, dimensions);
@@ -224,6 +226,17 @@ class Plan {
       type,
       member: index.length === 1 ? `${variable.member}[${index[0]}]` : `${variable.member}(${index.join(', ')})`,
     }));
+  }
+
+  // The compiler says nothing of either.
+  checkWhatIsDropped() {
+    for (const { place, name } of this.dropped.values()) {
+      this.remarks.push({ place, text: `STruC++ drops the initial values of the array ${name}: its elements begin with zeros` });
+    }
+    const standard = StdFunctionRegistry === undefined ? undefined : new StdFunctionRegistry();
+    return this.ast.functions
+      .filter((pou) => standard?.isStandardFunction(pou.name) === true)
+      .map((pou) => ({ place: placeOf(pou), text: `STruC++ calls its own function ${pou.name} in the place of this one; choose another name` }));
   }
 
   // As the compiler calls a member, which it does not always call as the source does.
@@ -412,6 +425,7 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
+  plan.problems.push(...found.checkWhatIsDropped());
   const table = await debugTable(result);
   plan.symbols = symbolsOf(table);
   if (plan.symbols.length > kMostSymbols) {

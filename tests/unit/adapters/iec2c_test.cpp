@@ -1,6 +1,7 @@
 #include "instances/adapters/matiec/iec2c.hpp"
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -45,6 +46,21 @@ TEST(Iec2cErrors, InItsLibraryNameTheNameOfTheProgramThatItHasToo) {
   EXPECT_THAT(told(library + ":2-11..2-12: error: invalid\n" + library + ":2-11..2-12: error: again"),
               ElementsAre("a.st:1:9: 'P' is also a name in the library of iec2c; choose another one"));
   std::remove(library.c_str());
+}
+
+TEST(Iec2cNames, OfItsLibraryAreRefusedWhereAProgramTakesThem) {
+  const std::string library = own_path("ieclib");
+  std::filesystem::create_directory(library);
+  std::ofstream(library + "/pid_st.txt")
+      << "(* FUNCTION NONE *)\nFUNCTION_BLOCK RAMP VAR TIMER : INT; END_VAR";
+  std::ofstream(library + "/standard_functions.txt") << "FUNCTION MAX : INT\nEND_FUNCTION";
+  const std::vector<iec::Source> sources{{"a.st",
+                                          "FUNCTION_BLOCK Ramp\nEND_FUNCTION_BLOCK\nFUNCTION Timer : INT "
+                                          "END_FUNCTION\nFUNCTION max : INT END_FUNCTION"}};
+  EXPECT_THAT(texts(taken_names(iec::read_project(sources).project, library)),
+              ElementsAre("a.st:1:16: 'Ramp' is also a name in the library of iec2c; choose another one",
+                          "a.st:4:10: 'max' is also a name in the library of iec2c; choose another one"));
+  std::filesystem::remove_all(library);
 }
 
 TEST(TheJoinedSource, HasLocatedVariablesInSectionsOfTheirOwn) {

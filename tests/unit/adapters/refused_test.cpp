@@ -38,6 +38,14 @@ TEST(RefusedByMatiec, AreNamesThatAreMacrosOfC) {
       ElementsAre(HasSubstr("'M_PI'"), HasSubstr("'int_max'")));
 }
 
+TEST(RefusedByMatiec, AreSuchNamesOfAConfiguration) {
+  EXPECT_THAT(
+      names("PROGRAM Main END_PROGRAM CONFIGURATION NAN RESOURCE Main ON PLC TASK eof (INTERVAL := T#1ms, "
+            "PRIORITY := 1); PROGRAM NULL WITH eof : Main; END_RESOURCE END_CONFIGURATION"),
+      ElementsAre(HasSubstr("'NAN' is a macro"), HasSubstr("'eof' is a macro"),
+                  HasSubstr("'NULL' is a macro"), HasSubstr("RESOURCE Main: a POU has this name")));
+}
+
 TEST(RefusedByMatiec, IsNoNameOfWhichItMakesAnother) {
   EXPECT_THAT(
       names("TYPE Mode : (eof, nan); END_TYPE PROGRAM p VAR pi : REAL; m : Mode := eof; END_VAR END_PROGRAM"),
