@@ -13,9 +13,10 @@ namespace plchost {
 
 namespace {
 
-using enum ControlVerb;
-constexpr std::array kBeside = {debug, write_variable, force_variable, unforce_variable};
-constexpr std::array kBreakOff = {stop, reset, reset_cold, restart};
+constexpr std::array kBeside = {ControlVerb::debug, ControlVerb::write_variable, ControlVerb::force_variable,
+                                ControlVerb::unforce_variable};
+constexpr std::array kBreakOff = {ControlVerb::stop, ControlVerb::reset, ControlVerb::reset_cold,
+                                  ControlVerb::restart};
 
 }  // namespace
 
