@@ -19,6 +19,19 @@ fail() {
   exit 1
 }
 
+# A program that writes on when `grep -q` has found its line is ended by SIGPIPE, and pipefail takes that for a failure. So this
+# one reads to the end.
+grep() {
+  local options=() quiet=no letters
+  while [[ ${1:-} == -* && $1 != -- ]]; do
+    letters=$1
+    [[ $1 == --* || $1 != *q* ]] || { quiet=yes letters=${1//q/}; }
+    [ "$letters" = - ] || options+=("$letters")
+    shift
+  done
+  if [ "$quiet" = yes ]; then command grep "${options[@]}" "$@" | cat >/dev/null; else command grep "${options[@]}" "$@"; fi
+}
+
 # Instances of a manager that was killed continue to run: only their command lines tell that they belong to this test.
 ours() { grep -lFf <(echo "$cell/") /proc/[0-9]*/cmdline 2>/dev/null | cut -d/ -f3 | grep -vx "$$" || true; }
 
