@@ -1,0 +1,164 @@
+#!/usr/bin/env bash
+# Stories of the packages on a machine of its own: a bare Debian that boots systemd as process 1, in a container.
+#   tests/machine/run.sh [--packages FOLDER] [SUITE]
+# SUITE: bookworm or trixie; default: the Debian of this machine. FOLDER: the packages for it, from manager/package.sh, which is
+# called without this option. The Debian is kept in .build/machine; a story changes nothing in it.
+# As root. Exit code 77: no such machine can be made here, and nothing was tested.
+set -euo pipefail
+
+packages=
+suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --packages) packages=$(realpath -e "${2:?"--packages needs a folder"}") && shift ;;
+    -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit ;;
+    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages and --help" >&2; exit 2 ;;
+    *) suite=$1 ;;
+  esac
+  shift
+done
+cd "$(dirname "$0")/../.."
+root=$PWD/.build/machine/$suite
+work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-machine.XXXXXX")
+log=$work/log
+container=
+clean_up() {
+  [ -z "$container" ] || { kill "$container" && wait "$container"; } 2>/dev/null || true
+  rm -rf "$work"
+}
+trap clean_up EXIT
+trap 'exit 130' INT TERM
+fail() {
+  echo "FAILED: $*" >&2
+  tail -n 30 "$log" >&2
+  [ -z "$container" ] || on_machine journalctl -q --no-pager -n 40 -u plchostd >&2 || true
+  exit 1
+}
+cannot() { echo "no machine can be made here: $*; nothing was tested" >&2; exit 77; }
+until_true() { # until_true SECONDS COMMAND...
+  local end=$((SECONDS + $1))
+  shift
+  until "$@" >/dev/null 2>&1; do
+    [ "$SECONDS" -lt "$end" ] || fail "did not happen in time: $*"
+    sleep 0.2
+  done
+}
+story() { echo "- $*"; }
+
+[ "$(id -u)" -eq 0 ] || cannot "only root can"
+for program in debootstrap systemd-nspawn g++; do
+  command -v "$program" >/dev/null || cannot "$program is missing (packages debootstrap, systemd-container, g++)"
+done
+if [ -z "$packages" ]; then
+  packages=$PWD/.build/packages
+  manager/package.sh "$packages" >"$log" || fail "no packages"
+fi
+
+# The root has all that the packages depend on: the machine has no network.
+if [ ! -e "$root/made" ]; then
+  rm -rf "$root"
+  archive=$(cat /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null |
+    sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\).*/\2/p' | grep -m1 '/debian/\?$') || cannot "apt's sources name no Debian archive"
+  debootstrap --variant=minbase --include=ca-certificates,dbus,jq,procps,systemd-sysv "$suite" "$root" "$archive" >"$log" 2>&1 ||
+    cannot "$(tail -n 1 "$log")"
+  touch "$root/made"
+fi
+cp /etc/resolv.conf "$root/etc/"
+cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/"
+needed=$(for package in "$packages"/*.deb; do dpkg-deb -f "$package" Depends | tr ',' '\n' | sed 's/^ *//' | grep -vE '^(libplc|plchost)'; done |
+  sort -u | paste -sd,)
+chroot "$root" sh -c 'apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -q satisfy -y --no-install-recommends "$1"' _ "$needed" \
+  >"$log" 2>&1 || cannot "its packages cannot be installed: $(tail -n 1 "$log")"
+
+mkdir "$work/applications"
+g++ -std=c++20 -O2 -shared -fPIC -I instances -o "$work/applications/bottling_line.so" instances/examples/bottling_line/*.cpp
+cat >"$work/applications/instances" <<'EOF'
+
+[[instance]]
+name = "line1"
+core = 1
+share_core = true
+application = "/applications/bottling_line.so"
+
+[[instance]]
+name = "line2"
+core = 1
+share_core = true
+application = "/applications/bottling_line.so"
+EOF
+
+systemd-nspawn -q -D "$root" --volatile=overlay --register=no --keep-unit --private-network --capability=CAP_IPC_LOCK \
+  --bind-ro="$packages:/packages" --bind-ro="$work/applications:/applications" -b --console=read-only >"$work/console" 2>&1 </dev/null &
+container=$!
+first_process() { leader=$(pgrep -P "$container" -x systemd); }
+on_machine() { nsenter -t "$leader" -a -- env -i HOME=/root TERM=dumb LC_ALL=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive "$@"; }
+has_booted() { on_machine systemctl is-system-running | grep -qE 'running|degraded'; }
+has_ended() { ! kill -0 "$container" 2>/dev/null; }
+for ((i = 0; i < 50; i++)); do first_process && break; has_ended && cannot "$(tail -n 1 "$work/console")"; sleep 0.2; done
+until_true 60 has_booted
+
+plcctl() { on_machine plcctl --timeout 10 "$@"; }
+files() {
+  on_machine find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /var/log -o -path /var/cache \
+    -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/lib/systemd -o -path /packages -o -path /applications \) -prune -o -print | sort
+}
+manager() { on_machine systemctl show -p MainPID --value plchostd; }
+instances() { plcctl list instances --json | jq -c '[.[] | {name, pid, state}] | sort_by(.name)'; }
+cycles() { plcctl list tasks --json | jq "[.[] | select(.instance == \"line1\")] | map(.$1) | add"; }
+run() { plcctl wait instance line1 line2 --timeout 30 && [ "$(on_machine systemctl is-active plchostd)" = active ]; }
+# ends_no_plc WHAT COMMAND...: another manager, the same processes of the instances. Cycles that are lost in the same time
+# without the command do not count; a machine that stands still gets further rounds.
+ends_no_plc() {
+  local what=$1 before=$shown other round lost control at
+  shift
+  for ((round = 1; round <= 5; round++)); do
+    at=$(cycles lost_cycles)
+    sleep 5
+    control=$(($(cycles lost_cycles) - at))
+    other=$(manager) at=$(cycles lost_cycles)
+    "$@" >"$log" 2>&1 || fail "$what"
+    is_another() { [ "$(manager)" != "$other" ] && [ "$(manager)" != 0 ] && run; }
+    until_true 40 is_another
+    lost=$(($(cycles lost_cycles) - at))
+    [ "$(instances)" = "$before" ] || fail "$what: $before before it, $(instances) after it"
+    [ "$lost" -gt "$control" ] || break
+    echo "  further round: $what: line1 lost $lost cycles, $control without it"
+  done
+  [ "$round" -le 5 ] || fail "$what costs cycles in each of 5 rounds"
+}
+
+story "the packages are installed, and the service runs without an instance"
+without=$(files)
+on_machine sh -c 'apt-get -q install -y --no-install-recommends /packages/*.deb' >"$log" 2>&1 || fail "the packages cannot be installed"
+sees_host() { [ "$(plcctl list hosts --json | jq -r ".[].host")" = plchost ]; }
+until_true 20 sees_host
+[ "$(on_machine systemctl is-active plchostd)" = active ] || fail "the service does not run"
+[ "$(on_machine python3 -c 'import plchost_client; print(plchost_client.Client(timeout=10).hosts()[0].name)')" = plchost ] || fail "Python sees no host"
+
+story "two instances come by a reload of the service"
+on_machine sh -c 'cat /applications/instances >>/etc/plchost/plchost.toml && systemctl reload plchostd' >"$log" 2>&1 || fail "the reload"
+until_true 20 plcctl start instance line1 line2
+run || fail "they do not run"
+shown=$(instances)
+
+story "a restart of the service, an upgrade, a kill and a stop of the manager's process end none of them"
+ends_no_plc "systemctl restart" on_machine systemctl restart plchostd
+ends_no_plc "an upgrade" on_machine sh -c 'apt-get -q install -y --reinstall /packages/*.deb'
+ends_no_plc "a kill of the manager" on_machine systemctl kill --kill-who=main -s KILL plchostd
+ends_no_plc "a manager that stands still" on_machine systemctl kill --kill-who=main -s STOP plchostd
+
+story "a stop ends them in order, and a start brings them back"
+on_machine systemctl stop plchostd
+[ "$(on_machine pgrep -c plc-instance)" = 0 ] || fail "instances run on after a stop"
+[ -z "$(on_machine ls /dev/shm)" ] || fail "left in /dev/shm: $(on_machine ls /dev/shm)"
+on_machine systemctl start plchostd
+until_true 20 run
+
+story "a removal keeps the state, and a purge leaves nothing"
+on_machine apt-get -q remove -y plchost >"$log" 2>&1 || fail "the removal"
+[ "$(on_machine pgrep -c 'plc')" = 0 ] || fail "$(on_machine pgrep -a plc) after the removal"
+on_machine test -e /var/lib/plchost || fail "the state is gone"
+on_machine test -e /etc/plchost/plchost.toml || fail "the configuration is gone"
+on_machine sh -c 'apt-get -q purge -y plchost libplchost-client1 libplcpool1 plchost-dev python3-plchost' >"$log" 2>&1 || fail "the purge"
+left=$(diff <(echo "$without") <(files)) || fail "left behind: $left"
+echo "all stories of the packages on Debian $suite: passed"
