@@ -267,12 +267,17 @@ DapSession::Answer DapSession::pause(const Json& arguments) {
   return Json::object();
 }
 
+std::int64_t DapSession::thread_of(const std::string& task) const {
+  return std::ranges::find(tasks_, task) - tasks_.begin() + 1;
+}
+
 void DapSession::tell_halt(const Json& task) {
-  const auto thread = std::ranges::find(tasks_, task.value("task", "")) - tasks_.begin() + 1;
-  Json body{{"reason", task.value("reason", "")}, {"threadId", thread}, {"allThreadsStopped", false}};
+  const std::string name = task.value("task", "");
+  Json body{
+      {"reason", task.value("reason", "")}, {"threadId", thread_of(name)}, {"allThreadsStopped", false}};
   if (task.contains("breakpoint")) body["hitBreakpointIds"] = Json::array({task["breakpoint"]});
   event("stopped", std::move(body));
-  halted_.insert(task.value("task", ""));
+  halted_.insert(name);
 }
 
 // A stop, another scheduler and a change of the application let them go.
@@ -283,8 +288,7 @@ void DapSession::tell_those_that_go_on() {
       ++at;
       continue;
     }
-    const auto thread = std::ranges::find(tasks_, *at) - tasks_.begin() + 1;
-    event("continued", {{"threadId", thread}, {"allThreadsContinued", false}});
+    event("continued", {{"threadId", thread_of(*at)}, {"allThreadsContinued", false}});
     at = halted_.erase(at);
   }
 }

@@ -57,6 +57,7 @@ class DapSession {
   [[nodiscard]] Answer written(const std::string& instance, const std::string& name,
                                const std::string& value);
   [[nodiscard]] Result<std::string> task_of(const Json& arguments);
+  [[nodiscard]] std::int64_t thread_of(const std::string& task) const;
   [[nodiscard]] std::string instance_of(std::int64_t frame) const;
   void event(const std::string& name, Json body);
   void tell(const std::string& category, const std::string& text);

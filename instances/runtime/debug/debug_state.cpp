@@ -57,15 +57,14 @@ Json json_of(const Breakpoint& breakpoint, const PouCollection& pous, bool order
 /// The parts of a state that is too long otherwise. Halts are told in each.
 struct Detail {
   std::size_t frames;
-  bool log;
-  bool orders;
+  bool texts;  ///< lines of log points, and what was written behind the places of breakpoints
   bool breakpoints;
   const char* left_out;
 };
 constexpr std::array kDetails{
-    Detail{DebugService::kMostFrames, true, true, true, ""}, Detail{4, true, true, true, ""},
-    Detail{4, false, false, true, "conditions and texts of breakpoints, and lines of log points"},
-    Detail{1, false, false, false, "all breakpoints, and lines of log points"}};
+    Detail{DebugService::kMostFrames, true, true, ""}, Detail{4, true, true, ""},
+    Detail{4, false, true, "conditions and texts of breakpoints, and lines of log points"},
+    Detail{1, false, false, "all breakpoints, and lines of log points"}};
 
 }  // namespace
 
@@ -94,11 +93,11 @@ std::string DebugService::state(std::size_t most) const {
     for (std::size_t i = 0; i < tasks_.size(); ++i) tasks.push_back(state_of_task(i, detail.frames));
     Json breakpoints = Json::array();
     for (const auto& breakpoint : breakpoints_) {
-      if (detail.breakpoints) breakpoints.push_back(json_of(*breakpoint, program_.pous(), detail.orders));
+      if (detail.breakpoints) breakpoints.push_back(json_of(*breakpoint, program_.pous(), detail.texts));
     }
     Json log = Json::array();
     for (const LogLine& line : log_) {
-      if (detail.log) log.push_back({{"number", line.number}, {"text", line.text}});
+      if (detail.texts) log.push_back({{"number", line.number}, {"text", line.text}});
     }
     std::string text = dump({{"session", session_},
                              {"halt_all", halt_all_},

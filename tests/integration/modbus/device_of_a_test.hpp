@@ -42,6 +42,14 @@ image = "t.out"
                      port.address(), more);
 }
 
+// A PLC that puts this word out again and again, until the register that device() writes has it.
+inline bool follows(Plant& plant, ModbusPeer& peer, std::uint16_t word) {
+  return eventually([&] {
+    plant.put_out(0, word);
+    return peer.holding(7) == word;
+  });
+}
+
 // The register that device() reads.
 inline void measure(ModbusPeer& peer, std::uint16_t value) {
   peer.with([&](modbus_mapping_t& mapping) { mapping.tab_input_registers[100] = value; });

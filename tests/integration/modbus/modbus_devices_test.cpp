@@ -104,10 +104,7 @@ TEST(ModbusDevices, ASilentPlcsOutputsBecomeZero) {
   const HeldPort port;
   ModbusPeer peer(port);
   const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 500")));
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 99);
-    return peer.holding(7) == 99;
-  })) << sut.log();
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   EXPECT_TRUE(eventually([&] { return peer.holding(7) == 0; }));  // nothing is put out any more
 }
 
@@ -116,10 +113,7 @@ TEST(ModbusDevices, ASilentPlcsOutputsStayIfSo) {
   const HeldPort port;
   ModbusPeer peer(port);
   ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 200\nwhen_silent = \"keep\"")));
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 99);
-    return peer.holding(7) == 99;
-  })) << sut.log();
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   const int requests = peer.requests();
   ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
   EXPECT_EQ(peer.holding(7), 99);
@@ -133,10 +127,7 @@ TEST(ModbusDevices, TheSafeStateOfAPlcIsNoSilence) {
   const HeldPort port;
   ModbusPeer peer(port);
   const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 99);
-    return peer.holding(7) == 99;
-  })) << sut.log();
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   plant.show_safe(PLC_IMAGE_STATE_STOPPED, 7);
   ASSERT_TRUE(eventually([&] {
     plant.beat();
@@ -155,19 +146,13 @@ TEST(ModbusDevices, APlcThatDiesInItsSilenceSwitchesNothingOnAgain) {
   const HeldPort port;
   ModbusPeer peer(port);
   const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 99);
-    return peer.holding(7) == 99;
-  })) << sut.log();
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   ASSERT_TRUE(eventually([&] { return peer.holding(7) == 0; }));
   plant.die_and_keep();
   const int requests = peer.requests();
   ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
   EXPECT_EQ(peer.holding(7), 0);
-  EXPECT_TRUE(eventually([&] {
-    plant.put_out(0, 98);
-    return peer.holding(7) == 98;
-  })) << "of its next process";
+  EXPECT_TRUE(follows(plant, peer, 98)) << "of its next process";
 }
 
 // The end of a host removes its images.
@@ -206,10 +191,7 @@ TEST(ModbusDevices, APlcThatNamesNoSafeStateIsSilentWhenItStops) {
   const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
   for (const unsigned state : {PLC_IMAGE_STATE_STOPPED, PLC_IMAGE_STATE_ENDED}) {
     plant.show_safe(PLC_IMAGE_STATE_UNTOLD, 99, false);
-    ASSERT_TRUE(eventually([&] {
-      plant.put_out(0, 99);
-      return peer.holding(7) == 99;
-    })) << sut.log();
+    ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
     plant.show_safe(state, 99, false);
     EXPECT_TRUE(eventually([&] {
       plant.beat();

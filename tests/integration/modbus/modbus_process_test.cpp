@@ -49,10 +49,7 @@ TEST(ModbusProcess, TheEndSetsTheOutputsThatADeviceTakesThoughItRefusesOthers) {
               fmt::format("{}kind = \"holding_register\"\naddress = {}\nimage = \"t.out\"\n", kWrite,
                           ModbusPeer::kRegisters));
   ModbusProgram sut(plant, plant.write(text));
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 99);
-    return peer.holding(7) == 99;
-  })) << sut.log();
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   EXPECT_EQ(sut.end(SIGTERM), 0);
   EXPECT_EQ(peer.holding(7), 0);
   EXPECT_TRUE(sut.logged("its outputs from address 300 were not set to zero")) << sut.log();
@@ -67,10 +64,7 @@ TEST(ModbusProcess, TheEndReachesADeviceBetweenTwoAttemptsToConnect) {
   text.replace(text.find("reconnect_ms = 100"), 18, "reconnect_ms = 3600000");
   text.replace(text.find("reconnect_max_ms = 200"), 22, "reconnect_max_ms = 3600000");
   ModbusProgram sut(plant, plant.write(text));
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 99);
-    return peer.holding(7) == 99;
-  })) << sut.log();
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   peer.set(Mode::garbage);
   ASSERT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); })) << sut.log();
   peer.set(Mode::normal);
