@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,6 +11,7 @@
 #include <unistd.h>
 
 #include "tests/integration/api/test_host.hpp"
+#include "tests/support/whole_lines.hpp"
 
 namespace plchost {
 namespace {
@@ -33,8 +33,7 @@ class Audit : public testing::Test {
   /// Of what was done, or with "/refused" of what was refused. `what`: of these only.
   [[nodiscard]] Records records(const std::string& what = "", const std::string& log = "") const {
     Records found;
-    std::ifstream file(folder_ + log + "/audit.0000000001.log");
-    for (std::string line; std::getline(file, line);) {
+    for (const std::string& line : whole_lines(folder_ + log + "/audit.0000000001.log")) {
       auto record = nlohmann::json::parse(line);
       if (what.empty() || record["what"] == what) found.push_back(std::move(record));
     }

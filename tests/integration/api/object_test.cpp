@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <thread>
 
@@ -12,6 +11,7 @@
 #include "api/client/client_core_status.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/whole_lines.hpp"
 
 namespace plchost {
 namespace {
@@ -124,12 +124,7 @@ class Watch {
     std::filesystem::remove(file_);
     std::filesystem::remove(file_ + ".errors");
   }
-  [[nodiscard]] std::vector<std::string> lines() const {
-    std::vector<std::string> lines;
-    std::ifstream stream(file_);
-    for (std::string line; std::getline(stream, line);) lines.push_back(line);
-    return lines;
-  }
+  [[nodiscard]] std::vector<std::string> lines() const { return whole_lines(file_); }
   // The lines as soon as there are so many.
   [[nodiscard]] std::vector<std::string> wait_for(std::size_t count) const {
     while (lines().size() < count && MonotonicClock::now() < deadline_) ::usleep(5000);

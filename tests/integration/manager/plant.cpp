@@ -18,6 +18,7 @@
 #include "shm/pool/object_pool.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/receive_until.hpp"
+#include "tests/support/whole_lines.hpp"
 
 namespace plchost {
 
@@ -102,11 +103,14 @@ void Plant::write_file(const std::string& name, const std::string& text) const {
   std::ofstream(folder_ / name) << text;
 }
 
+std::string Plant::text_of(const std::string& name) const {
+  std::ostringstream text;
+  text << std::ifstream(folder_ / name, std::ios::binary).rdbuf();
+  return text.str();
+}
+
 std::vector<std::string> Plant::lines_of(const std::string& name) const {
-  std::vector<std::string> lines;
-  std::ifstream file(folder_ / name);
-  for (std::string line; std::getline(file, line);) lines.push_back(line);
-  return lines;
+  return whole_lines(folder_ / name);
 }
 
 void Plant::use_api_server(const std::string& script) {
@@ -265,12 +269,6 @@ std::vector<std::string> Plant::leftovers() const {
     found.push_back(entry.path().string());
   }
   return found;
-}
-
-std::string Plant::log() const {
-  std::ostringstream text;
-  text << std::ifstream(folder_ / "log").rdbuf();
-  return text.str();
 }
 
 }  // namespace plchost

@@ -31,6 +31,7 @@ class Plant {
   void set_host_keys(std::string keys) { host_keys_ = std::move(keys); }
   /// In the folder of the configuration.
   void write_file(const std::string& name, const std::string& text) const;
+  [[nodiscard]] std::string text_of(const std::string& name) const;
   [[nodiscard]] std::vector<std::string> lines_of(const std::string& name) const;
   /// A shell script in place of plchost-dds.
   void use_api_server(const std::string& script);
@@ -75,7 +76,7 @@ class Plant {
 
   /// Names of ours in /dev/shm and in the run directory.
   std::vector<std::string> leftovers() const;
-  [[nodiscard]] std::string log() const;
+  [[nodiscard]] std::string log() const { return text_of("log"); }
   [[nodiscard]] std::string state_directory() const { return folder_ / "state"; }
   [[nodiscard]] std::string run_directory() const { return folder_ / "run"; }
   [[nodiscard]] const std::string& pool() const { return pool_; }

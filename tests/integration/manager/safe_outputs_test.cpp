@@ -39,7 +39,7 @@ class SafeOutputsUnderAManager : public ::testing::TestWithParam<SafeCase> {
   [[nodiscard]] bool shows(unsigned state, const OutputWords& words, std::uint64_t registers) const {
     OutputWords shown{};
     const bool read = plc_image_read(&terminal, shown.data(), nullptr) == PLC_IMAGE_OK;
-    const std::string device = plant.lines_of("device").at(0);
+    const std::string device = plant.text_of("device");
     std::uint64_t in_device = 0;
     std::memcpy(&in_device, device.data(), sizeof in_device);
     return read && plc_image_state(&terminal) == state && shown == words && in_device == registers;
