@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <span>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -174,6 +176,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     return keeps_name();
   } else if (fd == signals.get()) {
     spdlog::info("asked to end");
+    answer_what_was_done();
     return false;
   }
   return true;
@@ -423,6 +426,18 @@ void ControlServer::Parts::send_late_answers(TimePoint now) {
     if (!audit->is_written(answer.ticket) && now < answer.deadline) return;
     send_answer(answer.client, answer.identity, answer.code, answer.text);
     late_answers.pop_front();
+  }
+}
+
+// Otherwise the next server would be asked to do it again.
+void ControlServer::Parts::answer_what_was_done() {
+  if (auto finished = manager->receive()) finish(std::move(*finished));
+  const TimePoint end = MonotonicClock::now() + kPagePatience + kAuditPatience;
+  for (TimePoint now = MonotonicClock::now(); now < end; now = MonotonicClock::now()) {
+    answer_finished(now);
+    send_late_answers(now);
+    if (unanswered.empty() && late_answers.empty()) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }
 

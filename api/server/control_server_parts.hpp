@@ -81,6 +81,7 @@ struct ControlServer::Parts {
             std::string_view text);
   void send(const dds::Guid& client, const Answer& answer);
   void send_late_answers(TimePoint now);
+  void answer_what_was_done();
   void answer_finished(TimePoint now);
   [[nodiscard]] bool is_late(const plc_SampleIdentity& identity) const;
   void finish(std::vector<FinishedCommand> commands);

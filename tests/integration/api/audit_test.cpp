@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <future>
 #include <string>
 #include <thread>
 #include <vector>
@@ -39,6 +42,16 @@ class Audit : public testing::Test {
     }
     return found;
   }
+  /// As soon as there are so many and none is under way: an answer waits 500 ms for the log, and no longer.
+  [[nodiscard]] Records recorded(const std::string& what, std::size_t count) const {
+    const auto are_there = [&] {
+      std::error_code error;
+      return records(what).size() >= count && std::filesystem::is_empty(folder_ + "/under_way", error);
+    };
+    for (const TimePoint end = soon(); !are_there() && MonotonicClock::now() < end;)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return records(what);
+  }
   /// One whose disk hangs while the file `flag` is there.
   void replace_server_on_stuck_disk(const std::string& flag) {
     ::setenv("LD_PRELOAD", STUCK_DISK, 1);    // NOLINT(concurrency-mt-unsafe): the children have not started
@@ -55,7 +68,7 @@ class Audit : public testing::Test {
 
 TEST_F(Audit, AnAcknowledgedChangeIsRecordedWithItsClient) {
   ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
-  const Records stops = records("stop");
+  const Records stops = recorded("stop", 1);
   ASSERT_EQ(stops.size(), 1U);
   EXPECT_EQ(stops[0]["on"], "line1");
   EXPECT_EQ(stops[0]["result"], "ok");
@@ -85,7 +98,7 @@ TEST_F(Audit, WhatWasSentIsRecordedWithItsDigest) {
   const std::string file = host_.run_directory() + "/sent.so";
   std::ofstream(file) << "contents";
   ASSERT_EQ(run({"load", "application", "line1", file, "--boot"}).code, 0);
-  const Records sent = records("download application");
+  const Records sent = recorded("download application", 1);
   ASSERT_EQ(sent.size(), 1U);
   EXPECT_EQ(sent[0]["argument"],
             "sent.so sha256 d1b2a59fbea7e20077af9f91b27e95e865061b270be03ff539ab3b73587882e8 boot");
@@ -123,6 +136,7 @@ TEST_F(Audit, PostsAreCountedForEachSource) {
 TEST_F(Audit, ADiskThatHangsAtTheStartOfTheServerStopsNeitherPresenceNorPostsNorCommands) {
   (void)host_.add_event("line1", "ready");
   ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  ASSERT_EQ(recorded("stop", 1).size(), 1U);
   const std::string flag = host_.run_directory() + "/disk_hangs";
   std::ofstream(flag) << "hangs";
   replace_server_on_stuck_disk(flag);
@@ -166,7 +180,7 @@ TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
   const std::string flag = host_.run_directory() + "/disk_hangs";
   replace_server_on_stuck_disk(flag);
   ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
-  const std::size_t before = records("stop").size();
+  const std::size_t before = recorded("stop", 1).size();
   std::ofstream(flag) << "hangs";
   const auto client = connect(domain_);
   const TimePoint begin = MonotonicClock::now();
@@ -189,10 +203,32 @@ TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
   EXPECT_EQ(records("stop").size(), before + 3) << "waiting records are written then";
 }
 
+// The next one would be asked to do it again.
+TEST_F(Audit, AServerThatIsAskedToEndAnswersWhatWasDoneAlsoWhileTheDiskHangs) {
+  const std::string flag = host_.run_directory() + "/disk_hangs";
+  replace_server_on_stuck_disk(flag);
+  const auto client = connect(domain_);
+  ASSERT_TRUE(client->call({"hosta", plc_OPERATION_START, "line1", ""}, soon()));
+  std::ofstream(flag) << "hangs";
+  auto reply = std::async(std::launch::async,
+                          [&] { return client->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon()); });
+  while (host_.requests().size() < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // the manager has answered
+  host_.server().signal(SIGTERM);
+  const auto told = reply.get();
+  ASSERT_TRUE(told) << told.error().describe();
+  EXPECT_EQ(told->code, ErrorCode::ok);
+  EXPECT_EQ(host_.requests().size(), 2U);
+  std::filesystem::remove(flag);
+  EXPECT_EQ(host_.server().wait(), 0);
+}
+
 TEST_F(Audit, IsVerifiedAndAChangeFound) {
   for (int i = 0; i < 3; ++i) ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  ASSERT_EQ(recorded("stop", 3).size(), 3U);
   host_.replace_server();
   ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  ASSERT_EQ(recorded("stop", 4).size(), 4U);
   const RunResult whole = run({"verify", "audit", folder_});
   EXPECT_EQ(whole.code, 0) << whole.output;
   EXPECT_THAT(whole.output, HasSubstr("5 records, 1 to 5"));
