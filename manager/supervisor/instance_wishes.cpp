@@ -246,8 +246,9 @@ void ManagedInstance::tell_when_kept(const Operation& done, std::string text, co
                                        done_text(operation_of(done.request.verb), done.request.argument))
                          : text;
   if (!more.empty()) said = text = said + "; " + more;
-  // A command that only the process carries out is written nowhere: no disk is waited for.
-  if (operation_of(done.request.verb).place == OperationPlace::instance && !events)
+  // Of what only the process carries out, nothing else is written: no disk is waited for.
+  const bool written = events || done.request.verb == ControlVerb::set_scheduler;
+  if (operation_of(done.request.verb).place == OperationPlace::instance && !written)
     return done.reply(ControlReply{.number = done.request.number, .code = ErrorCode::ok, .text = text});
   own_.wishes.when_kept(
       [reply = done.reply, number = done.request.number, text, said](const std::string& problem) {

@@ -138,7 +138,7 @@ class RetainThatIsSeldomWritten : public testing::Test {
   /// The manager's helper writes the wish of the instance, and may wait for the disk. The answer to a command
   /// waits for the helper, and says so if that takes too long.
   bool wish_is_on_disk() {
-    const ControlReply reply = plant.ask(ControlVerb::reset_statistics, "packer1");
+    const ControlReply reply = plant.ask(ControlVerb::set_scheduler, "packer1", "CmpSchedule");
     EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
     return !reply.text.contains("power cut");
   }

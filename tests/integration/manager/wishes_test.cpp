@@ -34,9 +34,12 @@ class Wishes : public testing::TestWithParam<End> {
   }
   /// A change without a command is on the disk a moment later; the answer to a command comes when it is
   /// there.
-  void wait_for_disk() {
-    const auto reply = plant_.ask(ControlVerb::set_scheduler, "line1", "CmpSchedule");
-    ASSERT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  void wait_for_disk(const std::string& scheduler = "CmpSchedule") {
+    ASSERT_TRUE(Plant::eventually([&] {
+      const auto reply = plant_.ask(ControlVerb::set_scheduler, "line1", scheduler);
+      EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+      return !reply.text.contains("power cut");
+    }));
   }
   /// Long enough for a start that nobody asked for.
   void stays(InstanceState state) {
@@ -59,6 +62,7 @@ TEST_P(Wishes, RunsAgain) {
 TEST_P(Wishes, StaysStopped) {
   start();
   ASSERT_EQ(plant_.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  wait_for_disk();
   next_manager();
   stays(InstanceState::stopped);
   ASSERT_EQ(plant_.ask(ControlVerb::start, "line1").code, ErrorCode::ok);
@@ -99,6 +103,7 @@ TEST_P(Wishes, KeepsSchedulerApplicationAndEvents) {
   const std::string axis = Plant::application("drive_axis");
   ASSERT_EQ(plant_.ask(ControlVerb::load_application, "line1", axis).code, ErrorCode::ok);
   ASSERT_EQ(plant_.ask(ControlVerb::register_event, "line1", "door").code, ErrorCode::ok);
+  wait_for_disk("CmpScheduleTimer");
   next_manager();
   ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
   EXPECT_EQ(plant_.status("line1").scheduler.view(), "CmpScheduleTimer");
@@ -120,6 +125,7 @@ TEST_P(Wishes, KeepsItsRestarts) {
 TEST_P(Wishes, AreOlderThanAChangedConfiguration) {
   start();
   ASSERT_EQ(plant_.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  wait_for_disk();
   end_all();
   plant_.clear_instances();
   plant_.add("line1", "drive_axis");
