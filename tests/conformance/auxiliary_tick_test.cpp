@@ -178,6 +178,7 @@ TEST_F(AuxiliaryTicks, DeviceIsOffUnderASchedulerThatNeedsNoTicks) {
   const auto switch_to = [&](const char* name) {
     std::thread switching([&] { ASSERT_TRUE(set->switch_to(name, settings(milliseconds(1)))); });
     switching.join();
+    EXPECT_THAT(set->still_busy(MonotonicClock::now() + seconds(30)), testing::IsEmpty());
     clock.run_for(milliseconds(10));
   };
   switch_to("CmpScheduleTimer");

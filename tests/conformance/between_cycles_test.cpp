@@ -138,6 +138,7 @@ TEST_P(BetweenCyclesUnderLoad, NobodySeesAChangeWithinItsCycle) {
     ++changes;
   }
   wait_for_cycles(0, 10);
+  wait_for_cycles(1, 1);
   ASSERT_TRUE(set->stop(seconds(30)));
   std::printf("%d changes; the longest held all tasks for %.1f us\n", changes,
               std::chrono::duration<double, std::micro>(longest).count());

@@ -1,6 +1,7 @@
 #include <stdexcept>
 
 #include "tests/conformance/scheduler_fixture.hpp"
+#include "tests/support/sleeping_thread.hpp"
 
 namespace plchost {
 namespace {
@@ -179,7 +180,7 @@ TEST_P(ExternalEventTasks, ATaskWhosePosterEndedBeforeTheWakeIsWoken) {
   post("ready", 1);
   wait_for_cycles(0, 1);
   clock.settle();
-  std::this_thread::sleep_for(milliseconds(20));  // it sleeps in the kernel
+  while (!sleeps(set->task(0).trap().thread())) std::this_thread::sleep_for(milliseconds(1));
   add_without_wake("ready", 2);
   expect_no_further_cycle(0, 1);
   set->look_after_posts();

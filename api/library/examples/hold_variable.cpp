@@ -26,6 +26,7 @@ int main(int argc, char** argv) try {
   plchost::Client::Options options;
   if (const char* domain = std::getenv("PLCHOST_DOMAIN"))
     options.domain = static_cast<unsigned>(std::atoi(domain));
+  options.timeout = std::chrono::seconds(30);  // of a host that is just starting
   plchost::Client client(options);
   const std::string host = argv[1];
   const std::string instance = argv[2];

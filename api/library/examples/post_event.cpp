@@ -1,4 +1,5 @@
 // Posts an external event: post_event HOST INSTANCE/EVENT. The domain: PLCHOST_DOMAIN.
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
@@ -9,6 +10,7 @@ int main(int argc, char** argv) try {
   plchost::Client::Options options;
   if (const char* domain = std::getenv("PLCHOST_DOMAIN"))
     options.domain = static_cast<unsigned>(std::atoi(domain));
+  options.timeout = std::chrono::seconds(30);  // of a host that is just starting
   plchost::Client client(options);
   const auto run = client.post_and_wait(argv[1], argv[2]);
   std::printf("run by %s, there and back in %lld us\n", run.last_task.c_str(),

@@ -195,12 +195,15 @@ TEST_F(ClientVariables, AreWatchedInGroupsOfOneCycleEach) {
   EXPECT_GE(told.length(), (all.size() - 2) * kInterval) << "faster than its rate";
   std::size_t consistent = 0;
   int last = 0;
+  std::chrono::system_clock::time_point last_time{};
   for (const Client::Sampled& sampled : all) {
     ASSERT_TRUE(sampled) << sampled.text;
     ASSERT_EQ(sampled.sample.variables.size(), 2U);
     const int count = std::stoi(sampled.sample.variables[0].value);
-    EXPECT_GT(count, last) << "the same sample twice";
+    EXPECT_GE(count, last);
+    EXPECT_GT(sampled.sample.time, last_time) << "the same sample twice";
     last = count;
+    last_time = sampled.sample.time;
     if (!sampled.sample.consistent) continue;
     ++consistent;
     EXPECT_EQ(2 * count, std::stoi(sampled.sample.variables[1].value)) << "values of different cycles";

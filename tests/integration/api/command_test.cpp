@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <ctime>
+#include <future>
 #include <memory>
 #include <thread>
 
@@ -170,15 +171,19 @@ TEST_F(RemoteCommand, WithAnUnknownOperationIsRefusedByNumber) {
 }
 
 TEST_F(RemoteCommand, IsDoneOnceHoweverOftenItIsRepeated) {
-  host_.silent = true;
+  host_.hold = true;
   host_.start_server();
   const auto sut = connect(domain_);
 
-  const auto reply =
-      sut->call({"hosta", plc_OPERATION_RESET, "line1", ""}, MonotonicClock::now() + seconds(2));
+  auto reply = std::async(std::launch::async,
+                          [&] { return sut->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon()); });
+  while (host_.requests().empty()) std::this_thread::sleep_for(milliseconds(1));
+  std::this_thread::sleep_for(seconds(2));  // it is repeated meanwhile
+  host_.hold = false;
 
-  EXPECT_FALSE(reply);
-  EXPECT_EQ(host_.requests().size(), 1U);
+  EXPECT_TRUE(reply.get());
+  EXPECT_TRUE(sut->call({"hosta", plc_OPERATION_START, "line1", ""}, soon())) << "behind all repetitions";
+  EXPECT_EQ(host_.requests().size(), 2U);
 }
 
 TEST_F(RemoteCommand, SleepsWhileItsAnswerIsWaitedFor) {
@@ -202,8 +207,8 @@ TEST_F(RemoteCommand, OfAKilledClientDisturbsNoOther) {
   host_.silent = true;
   host_.start_server();
   {
-    const Child killed(PLCCTL_PROGRAM,
-                       {"--domain", std::to_string(domain_.number()), "stop", "instance", "line1"});
+    const Child killed(PLCCTL_PROGRAM, {"--domain", std::to_string(domain_.number()), "--timeout", "60",
+                                        "stop", "instance", "line1"});
     while (host_.requests().empty()) std::this_thread::sleep_for(milliseconds(5));
   }
   host_.silent = false;

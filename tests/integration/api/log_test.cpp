@@ -108,7 +108,7 @@ TEST_F(RemoteLog, IsFollowedAlsoOverTheEndOfTheServerAndANewNumbering) {
   say("before");
   const std::string seen = own_path("logs");
   Child follower(PLCCTL_PROGRAM,
-                 {"--domain", std::to_string(domain_.number()), "logs", "line1", "-f", "--timeout", "5"},
+                 {"--domain", std::to_string(domain_.number()), "logs", "line1", "-f", "--timeout", "60"},
                  seen);
   const auto shows = [&](std::string_view text) {
     for (const TimePoint end = soon(); MonotonicClock::now() < end;) {

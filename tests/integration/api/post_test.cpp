@@ -137,10 +137,10 @@ TEST(RemotePost, GoesOnWhileAnotherClientIsStopped) {
   const PoolEvent slow = host.add_event("line1", "slow");
   const PoolEvent fast = host.add_event("line1", "fast");
   host.start_server();
-  const Child stopped(
-      PLCCTL_PROGRAM,
-      {"--domain", std::to_string(domain.number()), "post", "event", "line1/slow", "--count", "1000000"},
-      "/dev/null");
+  const Child stopped(PLCCTL_PROGRAM,
+                      {"--domain", std::to_string(domain.number()), "--timeout", "60", "post", "event",
+                       "line1/slow", "--count", "1000000"},
+                      "/dev/null");
   while (slow.counted().count() < 100) std::this_thread::sleep_for(milliseconds(5));
   stopped.signal(SIGSTOP);
   const auto sut = connect(domain);

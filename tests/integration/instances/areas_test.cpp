@@ -103,8 +103,11 @@ class AreasOf : public ::testing::Test {
     };
     const std::size_t before = reports();
     (void)instance.event("report").post();
-    EXPECT_TRUE(eventually([&] { return reports() > before; })) << instance.log();
-    const std::string log = instance.log();
+    std::string log;
+    EXPECT_TRUE(eventually([&] {
+      log = instance.log();
+      return reports() > before && log.find('\n', log.rfind("torn ")) != std::string::npos;
+    })) << log;
     Report said;
     const int values = std::sscanf(
         log.c_str() + log.rfind("torn "),
@@ -360,7 +363,7 @@ TEST_F(AreasOf, ColdResetInitialisesRetainAndKeepsPersistent) {
   EXPECT_EQ(sut->end(SIGTERM), 0);
   start_well("", {"--start-kind", "cold"});
   const Report said = report();
-  EXPECT_LT(said.begun, before.begun);
+  EXPECT_LE(said.begun, 101 + sut->task("Fast")->counters.cycles) << "with the initial value, and one begun";
   EXPECT_GT(said.persistent, before.persistent);
 }
 

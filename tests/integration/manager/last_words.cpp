@@ -12,7 +12,7 @@ static void setup(plc::Application& app) {
   app.cyclic("Crash", 5, 10ms, [] {
     ++cycles;
     if (cycles == 1) plc::log("valve %d is stuck", 7);
-    if (cycles < 50) return;
+    if (cycles < 200) return;  // the lines from before have been taken by then
     std::printf("last words: pressure 9 bar\n");
     std::fprintf(stderr, "\x1b[31mred\x1b[0m");       // without an end of the line
     std::thread([] { std::raise(SIGSEGV); }).join();  // not in its cycle: that would be an exception

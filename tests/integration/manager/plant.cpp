@@ -26,6 +26,7 @@ namespace {
 
 const std::string kBuild = PLCHOST_BUILD_DIRECTORY;
 constexpr Duration kPatience = std::chrono::seconds(30);
+constexpr Duration kWriteTakes = std::chrono::seconds(2);  // if the writer loses its processor meanwhile
 
 }  // namespace
 
@@ -194,7 +195,6 @@ ControlReply Plant::ask(ControlVerb verb, const std::string& instance, const std
 }
 
 InstanceStatus Plant::status(const std::string& instance) {
-  constexpr Duration kWriteTakes = std::chrono::seconds(2);  // if the manager loses its processor meanwhile
   InstanceStatus found;
   (void)within(kWriteTakes, [&] {
     const auto page = HostPageReader::open(pool_);
@@ -233,14 +233,18 @@ bool Plant::wait_for(const std::string& instance, InstanceState state) {
 }
 
 TaskCounters Plant::counters(const std::string& instance) {
-  const auto page = InstancePageReader::open(pool_, instance);
   TaskCounters sum{};
-  for (std::uint32_t i = 0; page && i < page->task_count(); ++i) {
-    if (const auto task = page->task(i)) {
+  (void)within(kWriteTakes, [&] {
+    sum = {};
+    const auto page = InstancePageReader::open(pool_, instance);
+    for (std::uint32_t i = 0; page && i < page->task_count(); ++i) {
+      const auto task = page->task(i);
+      if (!task) return false;
       sum.cycles += task->counters.cycles;
       sum.lost_cycles += task->counters.lost_cycles;
     }
-  }
+    return true;
+  });
   return sum;
 }
 

@@ -66,9 +66,13 @@ TEST(CostsCycles, OfAnInstanceThatIsHeldUp) {
     ASSERT_EQ(::kill(pid, SIGCONT), 0);
   };
   std::vector<std::string> said;
-  EXPECT_TRUE(costs_cycles(plant, "drive1", hold_up, [&](std::string_view round) {
-    said.emplace_back(round);
-  })) << fmt::format("{}", fmt::join(said, "\n"));
+  const auto are_seen = [&] {
+    return costs_cycles(plant, "drive1", hold_up, [&](std::string_view round) { said.emplace_back(round); });
+  };
+  // A core that stands still for all of a pause hides that one.
+  bool seen = are_seen();
+  for (int more = 0; more < 4 && !seen; ++more) seen = are_seen();
+  EXPECT_TRUE(seen) << fmt::format("{}", fmt::join(said, "\n"));
 }
 
 TEST(Manager, BringsAKilledInstanceBackWhileTheOthersGoOn) {

@@ -21,8 +21,8 @@ TEST_F(SecuredBlocks, GoBetweenHostsOfAPlant) {
   ASSERT_TRUE(plant().add(security::Role::host, "south"));
   Side north(domain_, "north", 1, "press", {"--identity", folder("north")});
   Side south(domain_, "south", 2, "packer", {"--identity", folder("south")});
-  EXPECT_TRUE(goes(north, south, south.address_at(2), kPatience));
-  EXPECT_TRUE(goes(south, north, north.address_at(1), kPatience));
+  EXPECT_TRUE(reach(north, south.address_at(2), south));
+  EXPECT_TRUE(reach(south, north.address_at(1), north));
 }
 
 TEST_F(SecuredBlocks, DoNotGoToAHostOfAnotherPlant) {

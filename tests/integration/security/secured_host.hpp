@@ -45,7 +45,7 @@ class SecuredHost : public testing::Test {
   [[nodiscard]] RunResult run_with_folder(const std::string& identity_folder,
                                           std::vector<std::string> arguments) const;
   /// Whether plcctl sees the host within some seconds.
-  [[nodiscard]] bool sees_host(const std::string& identity_folder, const char* seconds = "10") const;
+  [[nodiscard]] bool sees_host(const std::string& identity_folder, const char* seconds = "60") const;
 
   OwnDomain domain_;
   std::string base_;

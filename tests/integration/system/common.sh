@@ -48,6 +48,17 @@ trap clean_up EXIT
 
 plcctl() { "$BIN/plcctl" --timeout 10 "$@"; }
 
+# asked COMMAND...: again while nobody answers (exit code 3). A look at variables waits 1 s for its instance.
+asked() {
+  local try code
+  for try in 1 2 3 4 5; do
+    code=0
+    "$@" || code=$?
+    [ "$code" -eq 3 ] || break
+  done
+  return "$code"
+}
+
 # The first and the last core that this test may use.
 first_core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
 last_core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '[0-9]+$')

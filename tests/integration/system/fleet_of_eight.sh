@@ -32,7 +32,8 @@ seen_whole() {
 wrong_clock=
 until_true 30 seen_whole
 [ -z "$wrong_clock" ] || fail "list hosts: $wrong_clock"
-is "$(of cell7 list hosts -o csv | tail -n 1 | cut -d, -f1,2)" cell7,alive || fail "one host as CSV"
+as_csv() { is "$(of cell7 list hosts -o csv | tail -n 1 | cut -d, -f1,2)" cell7,alive; }
+until_true 30 as_csv
 
 echo "- one vanishes: a watch says so, a fresh look does not show it; it comes back as it was"
 ip netns exec "$(space desk)" "$BIN/plcctl" --timeout 10 --interface cable --watch --every 0.5 list hosts --json >"$cell/watch.log" 2>&1 &
@@ -74,7 +75,8 @@ until_true 30 grep -q "another host has the name 'cell1'; asks for it again" "$c
 is "$(host_field cell1 manager_pid)" "${managers[0]}" || fail "cell1 was disturbed"
 tells_of_rival() { host_field cell1 problem | grep -q 'another host wants this name'; }
 until_true 30 tells_of_rival
-[ "$(pgrep -c -P "$twin" plc-instance)" = 1 ] || fail "the PLC of the second cell1 does not run"
+plc_of_twin() { is "$(pgrep -c -P "$twin" plc-instance)" 1; }
+until_true 30 plc_of_twin
 kill -TERM "$twin"
 wait "$twin" || fail "the manager of the second cell1 ended with $?"
 unset 'managers[-1]'

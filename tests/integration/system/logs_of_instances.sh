@@ -12,7 +12,7 @@ crashed() { said | grep -q 'manager *process [0-9]*: killed by SIGSEGV'; }
 until_true 20 crashed
 
 echo "- the last words, each with its process"
-"$BIN/plcctl" logs line1 -f >"$cell/followed.txt" &
+"$BIN/plcctl" --timeout 20 logs line1 -f >"$cell/followed.txt" &
 others+=($!)
 said | grep -qE 'Z  error +application +valve 7 is stuck|Z  info +application +valve 7 is stuck' || fail "$(said)"
 said | grep -qE 'output +last words: pressure 9 bar$' || fail "$(said)"

@@ -82,7 +82,7 @@ is "$said" "south/line1: state: running -> stopped" || fail "of one host: $said"
 printf '[[host.instance]]\nname = "line9"\nstate = "running"\n[[host]]\nname = "west"\n' >>"$cell/plant.toml"
 lines=$(wc -l <"$cell/plant.toml")
 exits 2 "$BIN/plcctl" --timeout 1 diff -f "$cell/plant.toml"
-exits 1 "$BIN/plcctl" --timeout 1 apply -f "$cell/plant.toml"
+exits 1 "$BIN/plcctl" --timeout 8 apply -f "$cell/plant.toml"
 grep -qF "$cell/plant.toml:$((lines - 1)): west: no host 'west' answers; those that do: north, south" <<<"$said" || fail "$said"
 grep -qF "$cell/plant.toml:$((lines - 4)): south/line9: no instance 'line9' on host 'south' (did you mean 'line1'?)" <<<"$said" || fail "$said"
 grep -qF "north/line2: state: stopped -> running: done" <<<"$said" || fail "north was not brought there: $said"

@@ -76,7 +76,9 @@ more_signs_than() { [ "$(signs)" -gt "$1" ]; }
 until_true 20 more_signs_than 2
 kill -STOP "${managers[0]}"
 for _ in $(seq 100); do grep -q "^State:.*T" "/proc/${managers[0]}/status" && break; sleep 0.1; done
-sleep 0.2 # its last words have come
+# Its words of before lie in the socket in front of this one.
+python3 -c 'import socket, sys; socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM).sendto(b"MARK", sys.argv[1])' "$NOTIFY_SOCKET"
+until_true 20 grep -qx MARK "$cell/notified"
 still=$(signs)
 sleep 1
 [ "$(signs)" = "$still" ] || fail "a manager that stands still shows that it goes round"

@@ -17,7 +17,7 @@ write_instance cell1 line1 "$first_core" line_variables
 start_manager cell1
 running() { is "$(as panel list instances --json | jq -r '.[0].state')" running; }
 until_true 20 running
-value() { as "$1" read variable line1 "$2" --json | jq -r '.[0].value'; }
+value() { asked as "$1" read variable line1 "$2" --json | jq -r '.[0].value'; }
 
 echo "- engineers, if nothing is said"
 is "$(value otto line.setpoint)" 20 || fail "$(value otto line.setpoint)"

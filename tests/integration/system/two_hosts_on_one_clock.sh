@@ -24,7 +24,9 @@ start_side north "$first_core"
 start_side south "$last_core"
 
 # on HOST FIELD: of the list of hosts
-on() { plcctl list hosts --json | jq -r ".[] | select(.host == \"$1\") | .$2"; }
+on() { plcctl --host "$1" list hosts --json | jq -r ".[0].$2"; }
+# drive HOST FIELD: of its instance
+drive() { plcctl --host "$1" list instances --json | jq -r ".[0].$2"; }
 in_sync() { [ "$(on "$1" grid_in_sync)" = true ]; }
 out_of_sync() { [ "$(on "$1" grid_in_sync)" = false ]; }
 # phase HOST: by the clock itself, where the releases of its 1 ms task are
@@ -48,13 +50,13 @@ until_true 20 together 25000
 until_true 20 near_by_the_status
 echo "apart by the clock: north $(phase north) ns, south $(phase south) ns from the grid; by the status: $(published_distance) ns"
 plcctl list hosts | head -n 1 | grep -q 'GRID(us) *IN-SYNC' || fail "no columns: $(plcctl list hosts)"
-both_locked() { is "$(instance drive_north clock_state),$(instance drive_south clock_state)" locked,locked; }
+both_locked() { is "$(drive north clock_state),$(drive south clock_state)" locked,locked; }
 until_true 20 both_locked
 
 echo "- the clock is set forward by 0.3 ms: both go there"
 write_phc 120000 300000
 for host in north south; do
-  stepped() { [ "$(instance "drive_$host" clock_steps)" -ge 1 ]; }
+  stepped() { [ "$(drive "$host" clock_steps)" -ge 1 ]; }
   until_true 20 stepped
   until_true 20 in_sync "$host"
 done
@@ -64,7 +66,7 @@ echo "- one of them loses its device, and says so"
 touch "$cell/south.gone"
 until_true 20 out_of_sync south
 until_true 20 in_sync north
-[[ "$(instance drive_south clock_problem)" == *"/dev/ptp-of-a-test"* ]] || fail "problem: $(instance drive_south clock_problem)"
+[[ "$(drive south clock_problem)" == *"/dev/ptp-of-a-test"* ]] || fail "problem: $(drive south clock_problem)"
 rm "$cell/south.gone"
 until_true 20 in_sync south
 until_true 20 together 25000

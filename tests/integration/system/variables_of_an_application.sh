@@ -11,12 +11,12 @@ write_instance cell line3 "$first_core" line_variables 'share_core = true' 'rest
 start_manager cell
 until_true 20 state_is line1 running
 
-value() { plcctl read variable line1 "$1" --json | jq -r '.[0].value'; }
-field() { plcctl list variables line1 "$1" --json | jq -r ".[0].$2"; }
-forces() { plcctl list forces --json | jq -r 'map("\(.instance) \(.name)=\(.forced_value)") | join(" ")'; }
+value() { asked plcctl read variable line1 "$1" --json | jq -r '.[0].value'; }
+field() { asked plcctl list variables line1 "$1" --json | jq -r ".[0].$2"; }
+forces() { asked plcctl list forces --json | jq -r 'map("\(.instance) \(.name)=\(.forced_value)") | join(" ")'; }
 
 echo "- seen: names, types, tasks, values"
-is "$(plcctl list variables line1 --json | jq -r 'map(.name) | join(" ")')" \
+is "$(asked plcctl list variables line1 --json | jq -r 'map(.name) | join(" ")')" \
   "fast.count fast.twice grid[][] line.label line.setpoint line.stopped line.total" || fail "$(plcctl list variables line1)"
 is "$(field fast.count type),$(field fast.count task)" "DINT,Fast" || fail "$(plcctl list variables line1)"
 is "$(field grid type)" "ARRAY [1..2, 0..2] OF INT" || fail "$(plcctl list variables line1 grid)"
@@ -27,7 +27,7 @@ refused "'line7'" plcctl list variables line7
 
 echo "- two variables that a task changes together are never seen apart"
 for _ in $(seq 50); do
-  plcctl read variable line1 fast.count fast.twice --json |
+  asked plcctl read variable line1 fast.count fast.twice --json |
     jq -e '(.[0].value | tonumber) * 2 == (.[1].value | tonumber)' >/dev/null || fail "two values of different cycles"
 done
 
@@ -55,14 +55,14 @@ start_manager cell
 until_true 20 state_is line1 running
 is "$(forces)" "line1 grid[1,1]=99 line1 line.total=7" || fail "$(plcctl list forces)"
 is "$(field line.total forced),$(field line.total forced_value),$(field line.setpoint forced)" "true,7,false" || fail "$(plcctl list variables line1)"
-is "$(plcctl read variable line1 line.total line.setpoint --json | jq -r 'map("\(.forced) \(.forced_value)") | join(",")')" "false null,true 7" ||
+is "$(asked plcctl read variable line1 line.total line.setpoint --json | jq -r 'map("\(.forced) \(.forced_value)") | join(",")')" "false null,true 7" ||
   fail "$(plcctl read variable line1 line.total line.setpoint --json)"
-plcctl read variable line1 line.total | grep -Eq '^line\.total +7 +7$' || fail "$(plcctl read variable line1 line.total)"
-plcctl read variable line1 grid | grep -Eq '^grid.* elements$' || fail "$(plcctl read variable line1 grid)"
-is "$(plcctl read variable line1 grid --json | jq -r '"\(.[0].forced) \(.[0].forced_value)"')" "true null" || fail "a forced array in JSON"
-is "$(plcctl record variables line1 line.total line.setpoint --duration 0.05 | awk -F, 'NR > 1 { print $NF; exit }')" line.total || fail "a recording does not say what is forced"
-plcctl watch variables line1 line.total --count 1 | grep -q '  forced$' || fail "watch does not say that it is forced"
-is "$(plcctl watch variables line1 line.total --count 1 --json | jq -r .forced)" true || fail "watch --json"
+asked plcctl read variable line1 line.total | grep -Eq '^line\.total +7 +7$' || fail "$(plcctl read variable line1 line.total)"
+asked plcctl read variable line1 grid | grep -Eq '^grid.* elements$' || fail "$(plcctl read variable line1 grid)"
+is "$(asked plcctl read variable line1 grid --json | jq -r '"\(.[0].forced) \(.[0].forced_value)"')" "true null" || fail "a forced array in JSON"
+is "$(asked plcctl record variables line1 line.total line.setpoint --duration 0.05 | awk -F, 'NR > 1 { print $NF; exit }')" line.total || fail "a recording does not say what is forced"
+asked plcctl watch variables line1 line.total --count 1 | grep -q '  forced$' || fail "watch does not say that it is forced"
+is "$(asked plcctl watch variables line1 line.total --count 1 --json | jq -r .forced)" true || fail "watch --json"
 is "$(instance line1 forces)" 2 || fail "$(instance line1 forces)"
 
 echo "- unforced: the program goes on with its own"
@@ -76,13 +76,13 @@ refused "is not forced" plcctl unforce variable line1 line.total
 echo "- watched and recorded"
 plcctl watch variables line1 fast.count --interval 0.02 --count 5 --json >"$cell/watched.txt"
 is "$(jq -r .value "$cell/watched.txt" | sort -n | uniq | wc -l)" 5 || fail "$(cat "$cell/watched.txt")"
-plcctl record variables line1 'fast.*' line.label --interval 0.02 --duration 1 --file "$cell/record.csv"
+plcctl record variables line1 'fast.*' line.label --interval 0.02 --duration 5 --file "$cell/record.csv"
 is "$(head -n 1 "$cell/record.csv")" "time,time_unix_ns,consistent,fast.count,fast.twice,line.label,forced" || fail "$(head -n 3 "$cell/record.csv")"
 [ "$(wc -l <"$cell/record.csv")" -gt 5 ] || fail "$(cat "$cell/record.csv")"
 awk -F, 'NR > 1 && $4 * 2 != $5 { exit 1 }' "$cell/record.csv" || fail "two values of different cycles: $(cat "$cell/record.csv")"
 
 echo "- a recording ends in time, and says that the host was silent then"
-plcctl record variables line1 line.total --interval 0.02 --duration 3 --file "$cell/silent.csv" 2>"$cell/silent.txt" &
+plcctl record variables line1 line.total --interval 0.02 --duration 6 --file "$cell/silent.csv" 2>"$cell/silent.txt" &
 recorder=$!
 until_true 10 test -s "$cell/silent.csv"
 server=$(pgrep -P "${managers[-1]}" -x plchost-dds)

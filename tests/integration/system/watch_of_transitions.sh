@@ -14,11 +14,11 @@ if said=$(plcctl list transitions lime1 2>&1); then fail "a list of no instance:
 grep -qF "no instance 'lime1' (did you mean 'line1'?)" <<<"$said" || fail "$said"
 
 # Programs of this shell itself, not of a function: so that a signal reaches them.
-"$BIN/plcctl" watch transitions line1 --json >"$cell/watch.json" 2>"$cell/watch.log" &
+"$BIN/plcctl" --timeout 20 watch transitions line1 --json >"$cell/watch.json" 2>"$cell/watch.log" &
 watch=$!
-"$BIN/plcctl" watch transitions line1 >"$cell/watch.text" 2>>"$cell/watch.log" &
+"$BIN/plcctl" --timeout 20 watch transitions line1 >"$cell/watch.text" 2>>"$cell/watch.log" &
 text=$!
-"$BIN/plcctl" watch transitions --count 13 >"$cell/watch.all" 2>>"$cell/watch.log" &
+"$BIN/plcctl" --timeout 20 watch transitions --count 13 >"$cell/watch.all" 2>>"$cell/watch.log" &
 all=$!
 others+=("$watch" "$text" "$all")
 

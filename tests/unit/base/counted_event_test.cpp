@@ -13,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/sleeping_thread.hpp"
+
 namespace plchost {
 namespace {
 
@@ -50,13 +52,17 @@ class Shared {
 TEST(CountedEvent, AWaiterBesideAPostThatWokeNobodyIsRoused) {
   CountedEvent sut;
   std::atomic<bool> woken{false};
+  std::atomic<pid_t> thread{0};
   std::jthread waiter([&] {
+    thread = ::gettid();
     follow(sut, 1);
     woken = true;
   });
-  std::this_thread::sleep_for(milliseconds(20));
+  auto& word = reinterpret_cast<std::atomic<std::uint64_t>&>(sut);
+  constexpr std::uint64_t kWaiter = 1;
+  while ((word & kWaiter) == 0 || !sleeps(thread)) std::this_thread::sleep_for(milliseconds(1));
   // The first step of a poster that is killed between its two steps.
-  reinterpret_cast<std::atomic<std::uint64_t>&>(sut).fetch_add(std::uint64_t{1} << 16);
+  word.fetch_add(std::uint64_t{1} << 16);
   std::this_thread::sleep_for(milliseconds(20));
   EXPECT_FALSE(woken);
   while (!woken) {  // the first time, unless the waiter had not come to its sleep

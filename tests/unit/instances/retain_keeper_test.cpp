@@ -336,9 +336,9 @@ TEST_F(RetainOfBusyTasks, IsSavedWhenTwoOfThemShareAnAreaAndOneMayWait) {
   ASSERT_TRUE(sut->start());
   const BusyTask one(*sut, 0, both, {area(0), area(0)}, true);
   const BusyTask other(*sut, 1, both, {area(1), area(1)}, true);
-  while (sut->saves() < 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_GT(saved()[0], kInitial);
-  EXPECT_GT(saved()[1], kInitial);
+  // One may begin late; if it is never saved, this does not end.
+  while (sut->saves() < 5 || saved()[0] <= kInitial || saved()[1] <= kInitial)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
 TEST_F(RetainOfBusyTasks, IsSavedThoughAnotherTaskIsStuckWithinACycle) {

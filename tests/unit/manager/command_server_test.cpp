@@ -37,9 +37,12 @@ class CommandServerTest : public testing::Test {
   PacketSocket connect() { return std::move(*PacketSocket::connect(path_)); }
   /// Lets the server do what there is to do.
   void serve() {
-    Reactor::Timer end(*reactor_, [this] { reactor_->stop(); });
-    end.set(MonotonicClock::now() + std::chrono::milliseconds(30));
-    ASSERT_TRUE(reactor_->run());
+    constexpr int kRounds = 20;  // all of it is there: it needs rounds, and no time
+    for (int i = 0; i < kRounds; ++i) {
+      Reactor::Timer end(*reactor_, [this] { reactor_->stop(); });
+      end.set(TimePoint{});
+      ASSERT_TRUE(reactor_->run());
+    }
   }
   static std::string request(std::uint64_t number) {
     return encode(

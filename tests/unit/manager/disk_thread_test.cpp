@@ -7,6 +7,8 @@
 namespace plchost {
 namespace {
 
+constexpr Duration kPatience = std::chrono::seconds(30);
+
 TEST(DiskThreadTest, GivesTheAnswersInTheirOrder) {
   DiskThread sut;
   for (int i = 0; i < 100; ++i) {
@@ -49,14 +51,14 @@ class WishFolderTest : public testing::Test {
 };
 
 TEST_F(WishFolderTest, IsMadeAndHeld) {
-  const auto taken = sut_.take(disk_, folder());
+  const auto taken = sut_.take(disk_, folder(), kPatience);
   ASSERT_TRUE(taken) << taken.error().describe();
   EXPECT_EQ(std::filesystem::status(folder()).permissions(), std::filesystem::perms::owner_all);
   const auto child = ::fork();
   if (child == 0) {  // another process
     WishFolderLock other;
     DiskThread disk;
-    const auto refused = other.take(disk, folder());
+    const auto refused = other.take(disk, folder(), kPatience);
     const bool good =
         !refused && refused.error().code == ErrorCode::already_exists &&
         refused.error().message.find(folder()) != std::string::npos &&

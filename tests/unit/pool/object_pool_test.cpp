@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 
 #include "shm/files/memory_file.hpp"
+#include "tests/unit/pool/create_patiently.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -263,7 +264,7 @@ TEST_F(ObjectPoolTest, ThreadsMayCreateAndListAtOnce) {
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
       for (int i = 0; i < 200; ++i) {
-        auto event = sut.create_event("event" + std::to_string((i * 7 + t) % 250));
+        auto event = create_patiently(sut, "event" + std::to_string((i * 7 + t) % 250));
         ASSERT_TRUE(event);
         event->set_registered(true);
         event->post();

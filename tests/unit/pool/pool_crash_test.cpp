@@ -16,6 +16,7 @@
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_layout.hpp"
+#include "tests/unit/pool/create_patiently.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -69,8 +70,10 @@ TEST_F(PoolCrash, SeveralProcessesCreateTheSamePoolAtOnce) {
     for (int i = 0; i < 4; ++i) {
       children.push_back(in_child([&] {
         auto pool = ObjectPool::create(name_.get(), {.max_objects = 64});
-        if (!pool || !pool->create_event("child" + std::to_string(i))) ::_exit(1);
-        pool->create_event("child" + std::to_string(i))->set_registered(true);
+        const auto event =
+            pool ? create_patiently(*pool, "child" + std::to_string(i)) : std::unexpected(pool.error());
+        if (!event) ::_exit(1);
+        event->set_registered(true);
       }));
     }
     for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
@@ -111,14 +114,21 @@ TEST_F(PoolCrash, APoolThatItsMakerNeverCompletedIsReplaced) {
 TEST_F(PoolCrash, AttachWaitsForAPoolThatIsBeingMade) {
   create(64);
   const MemoryFile memory = map();
-  header_of(memory).magic.store(0);
-  header_of(memory).magic_again.store(0);
-  std::thread maker([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    header_of(memory).magic.store(kPoolMagic, std::memory_order_release);
-  });
-  EXPECT_TRUE(ObjectPool::attach(name_.get()));
-  maker.join();
+  for (bool late = true; late;) {
+    header_of(memory).magic.store(0);
+    header_of(memory).magic_again.store(0);
+    const TimePoint begun = MonotonicClock::now();
+    std::atomic<TimePoint> made{};
+    std::thread maker([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      header_of(memory).magic.store(kPoolMagic, std::memory_order_release);
+      made = MonotonicClock::now();
+    });
+    const bool attached = ObjectPool::attach(name_.get()).has_value();
+    maker.join();
+    late = !attached && made.load() - begun > std::chrono::milliseconds(80);  // than anybody waits
+    EXPECT_TRUE(attached || late);
+  }
 }
 
 /// One that is killed with the lock held, in the middle of what `change` does.
@@ -195,11 +205,14 @@ TEST_F(PoolCrash, WhoMayOnlyReadDoesNotWaitForADeadOne) {
     header.changes.fetch_or(1);
     journal.set(header.high_water, header.high_water.load() + 1);
   });
-  const TimePoint begin = MonotonicClock::now();
+  Duration shortest = Duration::max();
   constexpr int kLooks = 10;
-  for (int i = 0; i < kLooks; ++i) EXPECT_EQ(reader->look_at("semaphore")->value, 3U);
-  // Each of them waited 50 ms for a living one.
-  EXPECT_LT(MonotonicClock::now() - begin, kLooks * std::chrono::milliseconds(50));
+  for (int i = 0; i < kLooks; ++i) {
+    const TimePoint begin = MonotonicClock::now();
+    EXPECT_EQ(reader->look_at("semaphore")->value, 3U);
+    shortest = std::min<Duration>(shortest, MonotonicClock::now() - begin);
+  }
+  EXPECT_LT(shortest, std::chrono::milliseconds(50)) << "each of them waits so long for a living one";
   EXPECT_TRUE(reader->open_semaphore("semaphore", MemoryFile::Access::read_only));
 }
 

@@ -64,7 +64,7 @@ void cycle() {
   ++fresh;
   if (hold) {
     hold = false;
-    const timespec pause{.tv_sec = 0, .tv_nsec = 300'000'000};
+    const timespec pause{.tv_sec = 3, .tv_nsec = 0};
     ::nanosleep(&pause, nullptr);
   }
 }
