@@ -118,13 +118,12 @@ LinkResult Device::read_inputs() {
   return {};
 }
 
-void Device::publish_inputs(TimePoint now) {
+void Device::publish_inputs() {
   for (InputImage* const image : input_images_) {
     image->update([&](std::span<std::byte> bytes) {
       for (Input& input : inputs_) {
         if (input.image == image) input.values.write_to(*input.map, bytes);
       }
-      show(*image, bytes, now);
     });
   }
 }
@@ -137,11 +136,13 @@ void Device::end_poll(const LinkResult& written, const LinkResult& read) {
     for (Output& output : outputs_) output.is_written = false;
   }
   const TimePoint now = MonotonicClock::now();
-  state_.polled(quality_, exception);
   if (read) {
-    state_.read(now);
-    publish_inputs(now);
+    state_.read(now);  // first: inputs that are too old become zero
+    publish_inputs();
   }
+  state_.polled(quality_, exception);  // behind the inputs: none is shown as good that has not come
+  if (read && status_image_ != nullptr)
+    status_image_->update([&](std::span<std::byte> bytes) { show(*status_image_, bytes, now); });
   report(failure);
 }
 

@@ -58,7 +58,7 @@ class Device {
   [[nodiscard]] bool outputs_of(Output& output, MapValues& values);
   void tell_silence(Output& output, bool silent) const;
   [[nodiscard]] LinkResult read_inputs();
-  void publish_inputs(TimePoint now);
+  void publish_inputs();
   void make_safe();
   void end_poll(const LinkResult& written, const LinkResult& read);
   void report(const LinkFailure* failure);
