@@ -6,7 +6,7 @@
  * build, which the manager refuses where its configuration says "allow_debug = false".
  *
  *     static const unsigned int lines[] = {12, 13};
- *     static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "main.st", lines, 2, 0};
+ *     static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "main.st", lines, 2, 0, 0, 0};
  *
  *     static void main_body(struct Main* self) {
  *       PLC_ENTER(main_pou, self);
@@ -15,6 +15,18 @@
  *       PLC_STATEMENT(13);
  *       ...
  *     }
+ *
+ * The variables at `self` are seen by the names that plc_debug_declare_instance and plc_declare_variable give
+ * them. Others that lie on the stack, as those of a function do, are declared with the POU:
+ *
+ *     static const Plc_Local locals[] = {{"x", PLC_TYPE_INT, 0, 0, 0}, {"sum", PLC_TYPE_DINT, 0, 0, 0}};
+ *     static Plc_Pou add_pou = {sizeof(Plc_Pou), "Add", "main.st", add_lines, 1, 0, locals, 2};
+ *
+ *     static int add(short x) {
+ *       int sum = 0;
+ *       void* const addresses[] = {&x, &sum};
+ *       PLC_ENTER_LOCALS(add_pou, 0, addresses, 0);
+ *       ...
  *
  * A statement costs one store and one test of a word as long as nobody debugs. Only the thread of the task
  * that comes to a breakpoint halts; it needs no signal, no right and no other process.
@@ -31,6 +43,17 @@ extern "C" {
 #define PLC_MAX_POUS 4096u
 #define PLC_MAX_POU_INSTANCES 65536u
 #define PLC_MAX_POU_LINES 65536u /* of one POU */
+#define PLC_MAX_POU_LOCALS 1024u /* of one POU */
+
+/* A variable that each call has for itself: a parameter, a local variable, the result of a function. */
+typedef struct {
+  const char* pszName;  /* as that of a declared variable, without "[]" */
+  unsigned int dwType;  /* PLC_TYPE_... of plc_variables.h */
+  unsigned int dwBytes; /* strings: of its memory; others: 0 */
+  unsigned int
+      dwFirstLine; /* the first and last line of the statements that it is there for. Several methods */
+  unsigned int dwLastLine; /* of a POU may have variables of one name. Both 0: it is there for all */
+} Plc_Local;
 
 /* A program, function block or function. It is there until plc_app_exit. */
 typedef struct {
@@ -40,20 +63,25 @@ typedef struct {
   const unsigned int* pdwLines; /* the lines at which a statement begins, ascending, each once */
   unsigned int nLines;          /* 1 to PLC_MAX_POU_LINES */
   unsigned int dwNumber;        /* the runtime's */
+  const Plc_Local* pLocals;     /* null: none */
+  unsigned int nLocals;         /* 0 to PLC_MAX_POU_LOCALS */
 } Plc_Pou;
 
-/* A call of a POU that has not returned: made by PLC_ENTER on the stack of the thread. */
+/* A call of a POU that has not returned: made by PLC_ENTER or PLC_ENTER_LOCALS on the stack of the thread. */
 typedef struct Plc_Frame {
   const Plc_Pou* pPou;
   const void* pSelf;         /* the variables of a program or function block; null: a function */
   unsigned int dwLine;       /* the statement that it is at; 0: none yet */
   unsigned int dwDepth;      /* calls below it, the runtime's */
   struct Plc_Frame* pCaller; /* null: it is the first */
+  void* const* ppLocals;     /* where the local variables of this call are; null for one: it is not seen */
+  unsigned int dwFirstLocal; /* the number in pLocals of the first of them */
+  unsigned int nLocals;
 } Plc_Frame;
 
-/* Declares a POU. From plc_app_init only. ERR_OK; ERR_PARAMETER: null, dwSize, a name, file or line that is
- * not allowed (the log says which); ERR_DUPLICATE: one of that name; ERR_NOMEMORY: there are PLC_MAX_POUS;
- * ERR_NOTINITIALIZED. Control. */
+/* Declares a POU. From plc_app_init only. ERR_OK; ERR_PARAMETER: null, dwSize, a name, file, line or local
+ * variable that is not allowed (the log says which); ERR_DUPLICATE: one of that name; ERR_NOMEMORY: there are
+ * PLC_MAX_POUS; ERR_NOTINITIALIZED. Control. */
 RTS_RESULT CDECL plc_debug_declare_pou(Plc_Pou* pPou);
 
 /* Says that the variables at pSelf are that program or function block, and how the names of its variables
@@ -68,8 +96,15 @@ void CDECL plc_debug_leave(Plc_Frame* pFrame);
 void CDECL plc_debug_statement(Plc_Frame* pFrame);
 
 /* The first statement of the code of a POU. */
-#define PLC_ENTER(pou, self)                                                                  \
-  Plc_Frame plc_frame_ __attribute__((cleanup(plc_debug_leave))) = {&(pou), (self), 0, 0, 0}; \
+#define PLC_ENTER(pou, self)                                                                           \
+  Plc_Frame plc_frame_ __attribute__((cleanup(plc_debug_leave))) = {&(pou), (self), 0, 0, 0, 0, 0, 0}; \
+  plc_debug_enter(&plc_frame_)
+
+/* The same in code with local variables. `addresses`: an array of them, of type void* const. `first`: the
+ * number in pLocals of the first; they are in its order. */
+#define PLC_ENTER_LOCALS(pou, self, addresses, first)                                             \
+  Plc_Frame plc_frame_ __attribute__((cleanup(plc_debug_leave))) = {                              \
+      &(pou), (self), 0, 0, 0, (addresses), (first), sizeof(addresses) / sizeof((addresses)[0])}; \
   plc_debug_enter(&plc_frame_)
 
 /* Before the statement of that line. */

@@ -22,7 +22,13 @@ Result<ValuePlace> find_value(std::string_view name) {
   for (std::size_t i = 0; i < types.size(); ++i) {
     if (name != "v" + std::to_string(i)) continue;
     const std::uint32_t size = types[i].bytes != 0 ? types[i].bytes : 16U;
-    return ValuePlace{.type = types[i].type, .bytes = size, .of_self = i % 2 == 0, .address = bytes.data()};
+    constexpr std::array kBases = {ValuePlace::Base::address, ValuePlace::Base::self,
+                                   ValuePlace::Base::local};
+    return ValuePlace{.type = types[i].type,
+                      .bytes = size,
+                      .base = kBases.at(i % kBases.size()),
+                      .address = bytes.data(),
+                      .local = static_cast<std::uint32_t>(i)};
   }
   return failure(ErrorCode::not_found, "no such variable");
 }
@@ -48,14 +54,20 @@ void make_breakpoint(std::string_view text) {
   (void)LogTemplate::parse(order->log, find_value);
   const auto condition = Condition::parse(order->condition, find_value);
   if (!condition) return;
-  const std::array<std::byte, 512> self{};
-  (void)condition->holds(self.data());
-  (void)condition->holds(nullptr);
+  std::array<std::byte, 512> self{};
+  const std::array<void*, 2> locals{self.data(), nullptr};
+  Plc_Frame frame{};
+  (void)condition->holds(frame);
+  frame.pSelf = self.data();
+  frame.ppLocals = locals.data();
+  frame.dwFirstLocal = 2;
+  frame.nLocals = locals.size();
+  (void)condition->holds(frame);
 }
 
 void find_place(std::string_view text) {
   static constexpr std::array kLines = {3U, 7U, 4'000'000'000U};
-  static Plc_Pou pou = {sizeof(Plc_Pou), "Main", "src/main.st", kLines.data(), kLines.size(), 0};
+  static Plc_Pou pou = {sizeof(Plc_Pou), "Main", "src/main.st", kLines.data(), kLines.size(), 0, nullptr, 0};
   static const PouCollection pous = [] {
     PouCollection made;
     if (made.declare(&pou) != ERR_OK) std::abort();

@@ -167,10 +167,10 @@ Result<Condition> Condition::parse(std::string_view text, const FindValue& find)
   return ConditionParser(text, find).parse();
 }
 
-bool Condition::compare(const Step& step, const void* self) noexcept {
-  const DebugNumber left = number_of(step.left.type, step.left.read(self));
+bool Condition::compare(const Step& step, const Plc_Frame& frame) noexcept {
+  const DebugNumber left = number_of(step.left.type, step.left.read(frame));
   const DebugNumber right =
-      step.with_variable ? number_of(step.right.type, step.right.read(self)) : step.value;
+      step.with_variable ? number_of(step.right.type, step.right.read(frame)) : step.value;
   switch (step.relation) {
     case Relation::equal:
       return left == right;
@@ -189,16 +189,16 @@ bool Condition::compare(const Step& step, const void* self) noexcept {
 }
 
 // Each operand takes a character at least, so the stack has room for all.
-bool Condition::holds(const void* self) const noexcept {
+bool Condition::holds(const Plc_Frame& frame) const noexcept {
   std::array<bool, kMaxText> stack{};
   std::size_t size = 0;
   for (const Step& step : steps_) {
     switch (step.kind) {
       case Kind::truth:
-        stack[size++] = number_of(step.left.type, step.left.read(self)) != 0;
+        stack[size++] = number_of(step.left.type, step.left.read(frame)) != 0;
         break;
       case Kind::compare:
-        stack[size++] = compare(step, self);
+        stack[size++] = compare(step, frame);
         break;
       case Kind::invert:
         stack[size - 1] = !stack[size - 1];

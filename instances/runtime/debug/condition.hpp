@@ -21,8 +21,8 @@ class Condition {
   /// invalid_argument, not_found: the text says what is wrong, and what is allowed.
   [[nodiscard]] static Result<Condition> parse(std::string_view text, const FindValue& find);
 
-  /// In the frame with these variables. Real-time.
-  [[nodiscard]] bool holds(const void* self) const noexcept;
+  /// In this frame. Real-time.
+  [[nodiscard]] bool holds(const Plc_Frame& frame) const noexcept;
 
  private:
   friend class ConditionParser;
@@ -37,7 +37,7 @@ class Condition {
     ValuePlace right = {};
     DebugNumber value = 0;
   };
-  [[nodiscard]] static bool compare(const Step& step, const void* self) noexcept;
+  [[nodiscard]] static bool compare(const Step& step, const Plc_Frame& frame) noexcept;
 
   std::vector<Step> steps_;
 };

@@ -27,9 +27,10 @@ std::optional<ValuePlace> place_in_each(ValuePlace place, std::span<const std::b
   const auto is_first = [&](const auto* one) { return one == addresses.front(); };
   if (addresses.size() > 1 && std::ranges::all_of(addresses, is_first)) return place;
   place.offset = addresses.front() - selves.front();
-  place.of_self = place.offset >= 0 && place.offset < kMaxInstanceBytes;
+  const bool is_within = place.offset >= 0 && place.offset < kMaxInstanceBytes;
+  if (is_within) place.base = ValuePlace::Base::self;
   for (std::size_t i = 1; i < addresses.size(); ++i) {
-    if (!place.of_self || addresses[i] - selves[i] != place.offset) return std::nullopt;
+    if (!is_within || addresses[i] - selves[i] != place.offset) return std::nullopt;
   }
   return place;
 }
@@ -40,6 +41,15 @@ ValuePlace DebugService::place_of(VariableElement element) const {
   const VariableAccess& variables = program_.variables();
   const VariableSymbol& symbol = variables.symbol(element);
   return {.type = symbol.type, .bytes = symbol.bytes, .address = variables.bytes(element).data()};
+}
+
+std::optional<ValuePlace> DebugService::find_local_value(PouLine place, std::string_view name) const {
+  const DeclaredPou& pou = program_.pous().pous()[place.pou];
+  const auto number = pou.local(name, place.line);
+  if (!number) return std::nullopt;
+  const DeclaredLocal& local = pou.locals[*number];
+  return ValuePlace{
+      .type = local.type, .bytes = local.bytes, .base = ValuePlace::Base::local, .local = *number};
 }
 
 Result<std::optional<ValuePlace>> DebugService::find_own_value(std::uint32_t pou,
@@ -76,6 +86,7 @@ Result<Breakpoint> DebugService::resolve(std::uint32_t id, BreakpointOrder order
                         .hits = std::make_shared<std::atomic<std::uint64_t>>(0)};
   PLCHOST_TRY_ASSIGN(breakpoint.place, program_.pous().find(breakpoint.order.place));
   const FindValue find = [&](std::string_view name) -> Result<ValuePlace> {
+    if (const auto local = find_local_value(breakpoint.place, name)) return *local;
     PLCHOST_TRY_ASSIGN(const auto own, find_own_value(breakpoint.place.pou, name));
     if (own) return *own;
     PLCHOST_TRY_ASSIGN(const auto element, program_.variables().find(name));

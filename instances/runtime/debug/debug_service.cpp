@@ -87,6 +87,7 @@ Result<std::string> DebugService::carry_out(std::string_view verb, std::string_v
   if (verb == "pause") return pause(rest);
   if (verb == "continue" || verb == "step" || verb == "next" || verb == "out" || verb == "until")
     return go_on(verb, rest);
+  if (verb == "local") return write_local(rest);
   if (verb == "halts") {
     if (rest != "all" && rest != "one")
       return failure(ErrorCode::invalid_argument,
@@ -98,11 +99,13 @@ Result<std::string> DebugService::carry_out(std::string_view verb, std::string_v
     end_session("the debugger leaves");
     return std::string("{}");
   }
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("'{}' is no command: break PLACE [hits COUNT] [if CONDITION] [log TEXT], delete "
-                             "ID|*, continue TASK|*, step TASK, next TASK, out TASK, until TASK PLACE, pause "
-                             "TASK|*, halts all|one and detach are",
-                             shown(verb)));
+  return failure(
+      ErrorCode::invalid_argument,
+      fmt::format("'{}' is no command. Of breakpoints there are break PLACE [hits COUNT] [if CONDITION] [log "
+                  "TEXT], delete ID|*, halts all|one and detach. Of tasks there are continue TASK|*, step "
+                  "TASK, next TASK, out TASK, until TASK PLACE, pause TASK|* and local TASK FRAME "
+                  "NAME=VALUE",
+                  shown(verb)));
 }
 
 std::string DebugService::remark() const {

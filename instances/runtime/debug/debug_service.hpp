@@ -105,8 +105,15 @@ class DebugService {
   /// Nothing: the POU has no variable of that name.
   [[nodiscard]] Result<std::optional<ValuePlace>> find_own_value(std::uint32_t pou,
                                                                  std::string_view name) const;
+  /// Nothing: there is no local variable of that name at that statement.
+  [[nodiscard]] std::optional<ValuePlace> find_local_value(PouLine place, std::string_view name) const;
   [[nodiscard]] ValuePlace place_of(VariableElement element) const;
-  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, std::size_t frames) const;
+  /// "TASK FRAME NAME=VALUE"
+  [[nodiscard]] Result<std::string> write_local(std::string_view order);
+  /// Of a task that halts; 0: where it halts.
+  [[nodiscard]] Result<const Plc_Frame*> frame_of(std::string_view task, std::string_view number) const;
+  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, std::size_t frames,
+                                             std::size_t with_locals) const;
   [[nodiscard]] std::string remark() const;
   [[nodiscard]] std::string remark_of(const Breakpoint& breakpoint) const;
   void end_session(std::string_view why);

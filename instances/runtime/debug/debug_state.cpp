@@ -25,15 +25,41 @@ std::string_view reason_text(HaltReason reason) noexcept {
   return "";
 }
 
+// Those of its statement that this call has.
+Json locals_of(const Plc_Frame& frame, const DeclaredPou& pou) {
+  Json locals = Json::array();
+  for (std::uint32_t i = 0; i < pou.locals.size(); ++i) {
+    const DeclaredLocal& local = pou.locals[i];
+    const std::byte* const address = local_address(frame, i);
+    if (address == nullptr || !local.is_at(frame.dwLine)) continue;
+    const std::span bytes(address, local.bytes);
+    locals.push_back({{"name", local.name},
+                      {"type", traits_of(local.type).name},
+                      {"value", variable_text(local.type, bytes)}});
+  }
+  return locals;
+}
+
+/// How much of a stack is told.
+struct StackDetail {
+  std::size_t frames = 0;
+  std::size_t with_locals = 0;  ///< the innermost, of those
+};
+
 // The frames are on the stack of a thread that sleeps.
-Json frames_of(const Plc_Frame* frame, const PouCollection& pous, std::size_t most) {
+Json frames_of(const Plc_Frame* frame, const PouCollection& pous, StackDetail detail) {
   Json frames = Json::array();
-  for (; frame != nullptr && frames.size() < most; frame = frame->pCaller) {
+  for (; frame != nullptr && frames.size() < detail.frames; frame = frame->pCaller) {
     if (frame->pPou == nullptr || frame->pPou->dwNumber >= pous.pous().size()) break;
     const DeclaredPou& pou = pous.pous()[frame->pPou->dwNumber];
     Json one{{"pou", pou.name}, {"file", pou.file}, {"line", frame->dwLine}};
     const auto path = pous.path_of(frame->pPou->dwNumber, frame->pSelf);
     if (!path.empty()) one["instance"] = path;
+    if (frame->nLocals > 0 && frames.size() < detail.with_locals) {
+      one["locals"] = locals_of(*frame, pou);
+    } else if (frame->nLocals > 0) {
+      one["locals_left_out"] = true;
+    }
     frames.push_back(std::move(one));
   }
   return frames;
@@ -56,19 +82,24 @@ Json json_of(const Breakpoint& breakpoint, const PouCollection& pous, bool order
 
 /// The parts of a state that is too long otherwise. Halts are told in each.
 struct Detail {
-  std::size_t frames;
+  StackDetail stack;
   bool texts;  ///< lines of log points, and what was written behind the places of breakpoints
   bool breakpoints;
   const char* left_out;
 };
 constexpr std::array kDetails{
-    Detail{DebugService::kMostFrames, true, true, ""}, Detail{4, true, true, ""},
-    Detail{4, false, true, "conditions and texts of breakpoints, and lines of log points"},
-    Detail{1, false, false, "all breakpoints, and lines of log points"}};
+    Detail{{DebugService::kMostFrames, DebugService::kMostFrames}, true, true, ""},
+    Detail{{DebugService::kMostFrames, 1}, true, true, "local variables of callers"},
+    Detail{{DebugService::kMostFrames, 0}, true, true, "local variables"},
+    Detail{{4, 0}, true, true, "local variables"},
+    Detail{
+        {4, 0}, false, true, "local variables, conditions and texts of breakpoints, and lines of log points"},
+    Detail{{1, 0}, false, false, "local variables, all breakpoints, and lines of log points"}};
 
 }  // namespace
 
-nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frames) const {
+nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frames,
+                                           std::size_t with_locals) const {
   const DebugTask& task = *tasks_[number];
   const auto halt = task.halt();
   Json one{{"task", name_of(number)}, {"state", halt ? "halted" : task.ignored() ? "ignored" : "runs"}};
@@ -82,7 +113,7 @@ nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frame
   one["halt"] = halt->number;
   one["reason"] = reason_text(halt->reason);
   if (halt->breakpoint != 0) one["breakpoint"] = halt->breakpoint;
-  one["stack"] = frames_of(halt->frame, program_.pous(), frames);
+  one["stack"] = frames_of(halt->frame, program_.pous(), {.frames = frames, .with_locals = with_locals});
   return one;
 }
 
@@ -90,7 +121,8 @@ std::string DebugService::state(std::size_t most) const {
   const auto dump = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
   for (const Detail& detail : kDetails) {
     Json tasks = Json::array();
-    for (std::size_t i = 0; i < tasks_.size(); ++i) tasks.push_back(state_of_task(i, detail.frames));
+    for (std::size_t i = 0; i < tasks_.size(); ++i)
+      tasks.push_back(state_of_task(i, detail.stack.frames, detail.stack.with_locals));
     Json breakpoints = Json::array();
     for (const auto& breakpoint : breakpoints_) {
       if (detail.breakpoints) breakpoints.push_back(json_of(*breakpoint, program_.pous(), detail.texts));

@@ -22,11 +22,11 @@ std::uint32_t DebugTask::look_at_breakpoints(const Plc_Frame& frame) noexcept {
   std::uint32_t halts_at = 0;
   if (const BreakpointTable* const table = table_.take(board_.table)) {
     for (const auto& breakpoint : table->at(frame.pPou->dwNumber, frame.dwLine)) {
-      if (breakpoint->condition && !breakpoint->condition->holds(frame.pSelf)) continue;
+      if (breakpoint->condition && !breakpoint->condition->holds(frame)) continue;
       const std::uint64_t hit = breakpoint->hits->fetch_add(1, std::memory_order_relaxed) + 1;
       if (!breakpoint->hit_rule.holds(hit)) continue;
       if (breakpoint->log) {
-        note(*breakpoint, frame.pSelf);
+        note(*breakpoint, frame);
       } else if (halts_at == 0) {
         halts_at = breakpoint->id;
       }
@@ -36,7 +36,7 @@ std::uint32_t DebugTask::look_at_breakpoints(const Plc_Frame& frame) noexcept {
   return halts_at;
 }
 
-void DebugTask::note(const Breakpoint& breakpoint, const void* self) noexcept {
+void DebugTask::note(const Breakpoint& breakpoint, const Plc_Frame& frame) noexcept {
   const std::uint64_t number = logged_.load(std::memory_order_relaxed);
   if (number - taken_.load(std::memory_order_acquire) == kLogHits) {
     lost_logs_.fetch_add(1, std::memory_order_relaxed);
@@ -46,7 +46,7 @@ void DebugTask::note(const Breakpoint& breakpoint, const void* self) noexcept {
   hit.breakpoint = breakpoint.id;
   const auto& values = breakpoint.log->values;
   for (std::size_t i = 0; i < values.size(); ++i)
-    std::ranges::copy(values[i].read(self), hit.values[i].begin());
+    std::ranges::copy(values[i].read(frame), hit.values[i].begin());
   logged_.store(number + 1, std::memory_order_release);
 }
 

@@ -79,7 +79,7 @@ class DebugTask {
 
  private:
   [[nodiscard]] std::uint32_t look_at_breakpoints(const Plc_Frame& frame) noexcept;
-  void note(const Breakpoint& breakpoint, const void* self) noexcept;
+  void note(const Breakpoint& breakpoint, const Plc_Frame& frame) noexcept;
   void stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReason reason,
                  std::uint32_t breakpoint) noexcept;
 

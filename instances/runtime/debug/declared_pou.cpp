@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "instances/runtime/debug/debug_value.hpp"
 #include "instances/runtime/debug/debug_words.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
@@ -34,6 +37,44 @@ bool is_pou_name(std::string_view name) noexcept {
   return !name.empty() && name.size() <= kMaxPouName && std::ranges::all_of(name, is_word);
 }
 
+Result<DeclaredLocal> declared_local(const Plc_Local& local) {
+  const auto name = text_at(local.pszName, kMaxVariableName);
+  const auto bad = [&](std::string_view what) {
+    return failure(ErrorCode::invalid_argument, fmt::format("local variable '{}': {}", shown(name), what));
+  };
+  const VariableTypeTraits* const type = find_variable_type(local.dwType);
+  if (type == nullptr)
+    return bad(fmt::format("dwType {} is not allowed: 1 to {} is", local.dwType, variable_types().size()));
+  if (!is_string(type->type) && local.dwBytes != 0 && local.dwBytes != type->bytes)
+    return bad(fmt::format("dwBytes {} is not allowed: 0 or {} is", local.dwBytes, type->bytes));
+  const VariableSymbol symbol{.name = std::string(name),
+                              .type = type->type,
+                              .bytes = is_string(type->type) ? local.dwBytes : type->bytes};
+  if (const auto valid = check_symbol(symbol); !valid) return bad(valid.error().message);
+  if (local.dwFirstLine > local.dwLastLine || (local.dwFirstLine == 0) != (local.dwLastLine == 0)) {
+    return bad(fmt::format("the lines {} to {} are not allowed: they ascend, or both are 0",
+                           local.dwFirstLine, local.dwLastLine));
+  }
+  return DeclaredLocal{.name = symbol.name,
+                       .type = symbol.type,
+                       .bytes = symbol.bytes,
+                       .first_line = local.dwFirstLine,
+                       .last_line = local.dwLastLine};
+}
+
+Result<std::vector<DeclaredLocal>> declared_locals(const Plc_Pou& pou) {
+  if (pou.nLocals > PLC_MAX_POU_LOCALS || (pou.nLocals > 0 && pou.pLocals == nullptr)) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("it has 0 to {} local variables", PLC_MAX_POU_LOCALS));
+  }
+  std::vector<DeclaredLocal> locals;
+  for (const Plc_Local& one : std::span(pou.pLocals, pou.nLocals)) {
+    PLCHOST_TRY_ASSIGN(auto local, declared_local(one));
+    locals.push_back(std::move(local));
+  }
+  return locals;
+}
+
 bool ascend(std::span<const std::uint32_t> lines) noexcept {
   return lines.front() > 0 && std::ranges::adjacent_find(lines, std::ranges::greater_equal()) == lines.end();
 }
@@ -47,6 +88,33 @@ std::string_view last_name(std::string_view path) noexcept {
 std::optional<std::uint32_t> DeclaredPou::line_from(std::uint32_t line) const noexcept {
   const auto found = std::ranges::lower_bound(lines, line);
   return found == lines.end() ? std::nullopt : std::optional(*found);
+}
+
+namespace {
+
+// Lines of a method may lie between others of its block: the narrowest range is that of the method.
+template <class Has>
+std::optional<std::uint32_t> narrowest(std::span<const DeclaredLocal> locals, std::string_view name,
+                                       std::uint32_t line, const Has& has) noexcept {
+  std::optional<std::uint32_t> found;
+  for (std::uint32_t i = 0; i < locals.size(); ++i) {
+    if (!locals[i].is_at(line) || !has(i) || !same_variable_name(locals[i].name, name)) continue;
+    if (!found || locals[i].reach() < locals[*found].reach()) found = i;
+  }
+  return found;
+}
+
+}  // namespace
+
+std::optional<std::uint32_t> DeclaredPou::local(std::string_view local_name,
+                                                std::uint32_t line) const noexcept {
+  return narrowest(locals, local_name, line, [](std::uint32_t) { return true; });
+}
+
+std::optional<std::uint32_t> DeclaredPou::local(std::string_view local_name,
+                                                const Plc_Frame& frame) const noexcept {
+  return narrowest(locals, local_name, frame.dwLine,
+                   [&](std::uint32_t number) { return local_address(frame, number) != nullptr; });
 }
 
 RTS_RESULT PouCollection::declare(Plc_Pou* pou) {
@@ -65,14 +133,18 @@ RTS_RESULT PouCollection::declare(Plc_Pou* pou) {
     return refuse_pou(ERR_PARAMETER, name, fmt::format("it has 1 to {} lines", PLC_MAX_POU_LINES));
   const std::span lines(pou->pdwLines, pou->nLines);
   if (!ascend(lines)) return refuse_pou(ERR_PARAMETER, name, "its lines are above 0 and ascend");
+  auto locals = declared_locals(*pou);
+  if (!locals) return refuse_pou(ERR_PARAMETER, name, locals.error().message);
   const bool known = std::ranges::any_of(
       pous_, [&](const DeclaredPou& other) { return same_variable_name(other.name, name); });
   if (known) return refuse_pou(ERR_DUPLICATE, name, "it is declared twice");
   if (pous_.size() == PLC_MAX_POUS)
     return refuse_pou(ERR_NOMEMORY, name, fmt::format("there are {} already", PLC_MAX_POUS));
   pou->dwNumber = static_cast<unsigned>(pous_.size());
-  pous_.push_back(
-      {.name = std::string(name), .file = std::string(file), .lines = {lines.begin(), lines.end()}});
+  pous_.push_back({.name = std::string(name),
+                   .file = std::string(file),
+                   .lines = {lines.begin(), lines.end()},
+                   .locals = *std::move(locals)});
   return ERR_OK;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -12,17 +13,41 @@
 
 #include "instances/plc_debug.h"
 #include "shm/base/result.hpp"
+#include "shm/variables/variable_type.hpp"
 
 namespace plchost {
+
+/// A variable of each call of a POU: see Plc_Local.
+struct DeclaredLocal {
+  std::string name;
+  VariableType type{};
+  std::uint32_t bytes = 0;
+  std::uint32_t first_line = 0;
+  std::uint32_t last_line = 0;
+
+  [[nodiscard]] bool is_at(std::uint32_t line) const noexcept {
+    return last_line == 0 || (first_line <= line && line <= last_line);
+  }
+  [[nodiscard]] std::uint32_t reach() const noexcept {
+    return last_line == 0 ? std::numeric_limits<std::uint32_t>::max() : last_line - first_line;
+  }
+};
 
 /// A program, function block or function that a debug build has declared.
 struct DeclaredPou {
   std::string name;
   std::string file;
-  std::vector<std::uint32_t> lines;  ///< ascending
+  std::vector<std::uint32_t> lines;        ///< ascending
+  std::vector<DeclaredLocal> locals = {};  ///< each at its number
 
   /// The first line with a statement that is not before `line`; nothing: there is none.
   [[nodiscard]] std::optional<std::uint32_t> line_from(std::uint32_t line) const noexcept;
+  /// The number of the local variable that a name means at a statement; nothing: none. Several methods may
+  /// have one of that name.
+  [[nodiscard]] std::optional<std::uint32_t> local(std::string_view name, std::uint32_t line) const noexcept;
+  /// The same at the statement of a call, of those that it has.
+  [[nodiscard]] std::optional<std::uint32_t> local(std::string_view name,
+                                                   const Plc_Frame& frame) const noexcept;
 };
 
 /// A POU, and a line of it with a statement.

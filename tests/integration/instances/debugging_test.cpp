@@ -91,6 +91,66 @@ TEST_F(DebuggingByHand, SaysWhichVariablesAConditionMeans) {
   EXPECT_EQ(command("break Lamp if right.lit > 0").value("remark", "x"), "");
 }
 
+TEST_F(DebuggingByHand, ShowsAndWritesLocalVariables) {
+  attach();
+  command("break Twice if value > 3 AND factor = 2");
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  const int n = std::stoi(values_->read("Main.counter.n"));
+  EXPECT_GT(n, 3);
+  const json frames = task("Main")["stack"];
+  ASSERT_EQ(frames.size(), 2U);
+  EXPECT_EQ(frames[0]["locals"],
+            json::array({{{"name", "value"}, {"type", "DINT"}, {"value", std::to_string(n)}},
+                         {{"name", "factor"}, {"type", "INT"}, {"value", "2"}},
+                         {{"name", "word"}, {"type", "STRING"}, {"value", "'double'"}}}));
+  EXPECT_FALSE(frames[1].contains("locals")) << "it has none";
+  command("local Main 0 Factor = 5");
+  command("local Main 0 word='five'");
+  EXPECT_EQ(task("Main")["stack"][0]["locals"][1]["value"], "5");
+  EXPECT_EQ(task("Main")["stack"][0]["locals"][2]["value"], "'five'");
+  EXPECT_EQ(stack_after("out"), "Main:26");
+  EXPECT_EQ(values_->read("Main.doubled"), std::to_string(5 * n));
+  EXPECT_THAT(refused("local Main 0 factor=5"), HasSubstr("no local variable 'factor' at Main:26"));
+}
+
+TEST_F(DebuggingByHand, RefusesLocalVariablesThatThereAreNot) {
+  attach();
+  EXPECT_THAT(refused("local Main 0 factor=5"), HasSubstr("task 'Main' does not halt"));
+  command("break Twice");
+  ASSERT_TRUE(halts("Main"));
+  EXPECT_THAT(refused("local Main 0 factor=32768"), HasSubstr("32767"));
+  EXPECT_THAT(refused("local Main 0 word='longer than 7'"), HasSubstr("word"));
+  EXPECT_THAT(refused("local Main 1 factor=5"), HasSubstr("no local variable 'factor' at Main:24"));
+  EXPECT_THAT(refused("local Main 2 factor=5"), HasSubstr("the frames have 0 to 1"));
+  EXPECT_THAT(refused("local Main x factor=5"), HasSubstr("no frame 'x'"));
+  EXPECT_THAT(refused("local Main 0 factor"), HasSubstr("NAME=VALUE"));
+  EXPECT_THAT(refused("local Nobody 0 factor=5"), HasSubstr("no task 'Nobody'"));
+  EXPECT_EQ(task("Main")["stack"][0]["locals"][1]["value"], "2");
+}
+
+TEST_F(DebuggingByHand, LeavesLocalVariablesOfCallersOutOfAStateThatIsTooLong) {
+  attach();
+  command("break Deep if level = 0");
+  process_->event("edge").post();
+  ASSERT_TRUE(halts("Edge"));
+  const json now = state();
+  EXPECT_EQ(now.value("left_out", ""), "local variables of callers");
+  const json frames = task("Edge")["stack"];
+  EXPECT_EQ(frames.size(), 32U);
+  EXPECT_EQ(frames[0]["locals"].size(), 9U);
+  EXPECT_TRUE(frames[1].value("locals_left_out", false));
+  EXPECT_FALSE(frames[1].contains("locals"));
+  command("local Edge 40 level=7");
+}
+
+TEST_F(DebuggingByHand, WritesLocalVariablesIntoLogPoints) {
+  attach();
+  command("break Twice hits %5 log {value} times {factor}");
+  EXPECT_TRUE(eventually([&] { return !state()["log"].empty(); }));
+  EXPECT_THAT(state()["log"][0].value("text", ""), HasSubstr(" times 2"));
+  EXPECT_THAT(refused("break Twice log {word}"), HasSubstr("string"));
+}
+
 TEST_F(DebuggingByHand, WritesLogPointsAndHaltsNot) {
   attach();
   command("break Counter:14 hits %5 log n is {n} of {Main.cycles}");

@@ -32,7 +32,7 @@ class BreakpointConditions : public testing::Test {
  protected:
   Result<ValuePlace> find(std::string_view name) {
     const auto own = [&](VariableType type, std::uint32_t bytes, std::ptrdiff_t offset) {
-      return ValuePlace{.type = type, .bytes = bytes, .of_self = true, .address = nullptr, .offset = offset};
+      return ValuePlace{.type = type, .bytes = bytes, .base = ValuePlace::Base::self, .offset = offset};
     };
     if (name == "speed") return own(VariableType::int_, 2, offsetof(MotorData, speed));
     if (name == "on") return own(VariableType::bool_, 1, offsetof(MotorData, on));
@@ -40,6 +40,10 @@ class BreakpointConditions : public testing::Test {
     if (name == "limit") {
       return ValuePlace{
           .type = VariableType::lreal, .bytes = 8, .address = reinterpret_cast<const std::byte*>(&limit_)};
+    }
+    if (name == "sum") {
+      return ValuePlace{
+          .type = VariableType::dint, .bytes = 4, .base = ValuePlace::Base::local, .local = kSum};
     }
     if (name == "label") return own(VariableType::string, 8, 0);
     return failure(ErrorCode::not_found, "no variable '" + std::string(name) + "'");
@@ -50,13 +54,23 @@ class BreakpointConditions : public testing::Test {
   bool holds(std::string_view text, const MotorData& data) {
     const auto made = parse(text);
     EXPECT_TRUE(made) << text << ": " << made.error().describe();
-    return made && made->holds(&data);
+    return made && made->holds(frame_of(&data));
+  }
+  /// With two local variables from number kSum - 1 on.
+  static Plc_Frame frame_of(const MotorData* data, void* const* locals = nullptr) {
+    Plc_Frame frame{};
+    frame.pSelf = data;
+    frame.ppLocals = locals;
+    frame.dwFirstLocal = kSum - 1;
+    frame.nLocals = locals == nullptr ? 0 : 2;
+    return frame;
   }
   std::string fault(std::string_view text) {
     const auto made = parse(text);
     return made ? "" : made.error().message;
   }
 
+  static constexpr std::uint32_t kSum = 3;
   double limit_ = 7.5;
 };
 
@@ -83,7 +97,34 @@ TEST_F(BreakpointConditions, CompareVariablesOfTheirFrame) {
 TEST_F(BreakpointConditions, OfAFunctionHaveNoOwnVariables) {
   const auto made = parse("speed > 0");
   ASSERT_TRUE(made);
-  EXPECT_FALSE(made->holds(nullptr));
+  EXPECT_FALSE(made->holds(frame_of(nullptr)));
+}
+
+TEST_F(BreakpointConditions, CompareLocalVariablesOfTheirCall) {
+  std::int32_t sum = 7;
+  std::int16_t other = 8;
+  std::array<void*, 2> locals{&other, &sum};
+  const MotorData data{.speed = 7};
+  const auto made = parse("sum = speed AND sum > 6");
+  ASSERT_TRUE(made) << made.error().describe();
+  EXPECT_TRUE(made->holds(frame_of(&data, locals.data())));
+  sum = 8;
+  EXPECT_FALSE(made->holds(frame_of(&data, locals.data())));
+  EXPECT_FALSE(made->holds(frame_of(&data))) << "a call without local variables";
+  locals[1] = nullptr;
+  EXPECT_FALSE(made->holds(frame_of(&data, locals.data()))) << "one that cannot be seen";
+}
+
+TEST_F(BreakpointConditions, ReadNoLocalVariableBeyondThoseOfTheCall) {
+  std::int32_t sum = 7;
+  const std::array<void*, 2> locals{&sum, &sum};
+  Plc_Frame frame = frame_of(nullptr, locals.data());
+  EXPECT_NE(local_address(frame, kSum), nullptr);
+  EXPECT_EQ(local_address(frame, 0), nullptr);
+  EXPECT_EQ(local_address(frame, kSum + 1), nullptr);
+  EXPECT_EQ(local_address(frame, 4'294'967'295U), nullptr);
+  frame.dwFirstLocal = 4'294'967'295U;
+  EXPECT_EQ(local_address(frame, 0), nullptr);
 }
 
 TEST_F(BreakpointConditions, AreRefused) {
@@ -179,10 +220,10 @@ class StepRules : public testing::Test {
  protected:
   [[nodiscard]] bool halts(StepRule::Kind kind, std::uint32_t depth, unsigned line, std::uint64_t cycle = 5) {
     const StepRule rule{.kind = kind, .cycle = 5, .depth = 1, .line = 10, .pou = 0};
-    const Plc_Frame frame{&pou_, nullptr, line, depth, nullptr};
+    const Plc_Frame frame{&pou_, nullptr, line, depth, nullptr, nullptr, 0, 0};
     return rule.halts_at(frame, cycle);
   }
-  Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0};
+  Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0, nullptr, 0};
 };
 
 TEST_F(StepRules, HaltWhereTheySay) {

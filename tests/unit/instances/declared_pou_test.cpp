@@ -2,11 +2,14 @@
 
 #include <array>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "instances/plc_variables.h"
 
 namespace plchost {
 namespace {
@@ -15,10 +18,12 @@ using testing::HasSubstr;
 
 class DeclaredPous : public testing::Test {
  protected:
-  RTS_RESULT declare(const char* name, const char* file, std::vector<unsigned> lines) {
+  RTS_RESULT declare(const char* name, const char* file, std::vector<unsigned> lines,
+                     const std::vector<Plc_Local>& locals = {}) {
     lines_.push_back(std::move(lines));
-    pous_.push_back(
-        {sizeof(Plc_Pou), name, file, lines_.back().data(), static_cast<unsigned>(lines_.back().size()), 0});
+    pous_.push_back({sizeof(Plc_Pou), name, file, lines_.back().data(),
+                     static_cast<unsigned>(lines_.back().size()), 0, locals.data(),
+                     static_cast<unsigned>(locals.size())});
     return sut.declare(&pous_.back());
   }
 
@@ -64,6 +69,71 @@ TEST_F(DeclaredPous, AreRefused) {
   pous_.push_back(pous_.back());
   pous_.back().dwSize = 8;
   EXPECT_EQ(sut.declare(&pous_.back()), ERR_PARAMETER);
+}
+
+TEST_F(DeclaredPous, HaveLocalVariables) {
+  ASSERT_EQ(declare("Pump", "a.st", {3, 5, 9, 11},
+                    {{"x", PLC_TYPE_INT, 0, 0, 0},
+                     {"x", PLC_TYPE_REAL, 4, 5, 5},
+                     {"name", PLC_TYPE_COUNTED_STRING, 81, 9, 11},
+                     {"at.y", PLC_TYPE_LINT, 0, 0, 0}}),
+            ERR_OK);
+  const DeclaredPou& pou = sut.pous().front();
+  EXPECT_EQ(pou.local("X", 3), 0U);
+  EXPECT_EQ(pou.local("x", 5), 1U) << "that of the narrowest lines";
+  EXPECT_EQ(pou.local("name", 9), 2U);
+  EXPECT_EQ(pou.local("name", 8), std::nullopt);
+  EXPECT_EQ(pou.local("name", 12), std::nullopt);
+  EXPECT_EQ(pou.local("at.Y", 11), 3U);
+  EXPECT_EQ(pou.local("z", 3), std::nullopt);
+  EXPECT_EQ(pou.locals[0].bytes, 2U);
+  EXPECT_EQ(pou.locals[2].bytes, 81U);
+}
+
+// Two methods may even stand in one line.
+TEST_F(DeclaredPous, HaveTheLocalVariablesOfACall) {
+  ASSERT_EQ(
+      declare("Pump", "a.st", {5},
+              {{"x", PLC_TYPE_INT, 0, 5, 5}, {"y", PLC_TYPE_INT, 0, 5, 5}, {"x", PLC_TYPE_REAL, 0, 5, 5}}),
+      ERR_OK);
+  float x = 0;
+  const std::array<void*, 1> addresses{&x};
+  Plc_Frame frame{&pous_.back(), nullptr, 5, 0, nullptr, addresses.data(), 2, 1};
+  const DeclaredPou& pou = sut.pous().front();
+  EXPECT_EQ(pou.local("x", frame), 2U);
+  EXPECT_EQ(pou.local("y", frame), std::nullopt);
+  frame.dwLine = 6;
+  EXPECT_EQ(pou.local("x", frame), std::nullopt);
+  EXPECT_EQ(pou.local("x", 5), 0U);
+}
+
+TEST_F(DeclaredPous, AreRefusedForTheirLocalVariables) {
+  const auto with = [&](Plc_Local local) { return declare("A", "a.st", {1}, {local}); };
+  EXPECT_EQ(with({nullptr, PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"", PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a b", PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a[]", PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({std::string(251, 'a').c_str(), PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", 0, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_DAYS_DATE + 1, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_INT, 4, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_STRING, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_STRING, PLC_MAX_STRING + 1, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_INT, 0, 5, 4}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_INT, 0, 0, 4}), ERR_PARAMETER);
+  Plc_Pou pou{sizeof(Plc_Pou), "A", "a.st", lines_.back().data(), 1, 0, nullptr, 1};
+  EXPECT_EQ(sut.declare(&pou), ERR_PARAMETER);
+  EXPECT_TRUE(sut.pous().empty());
+}
+
+TEST_F(DeclaredPous, HaveABoundOfLocalVariables) {
+  std::vector<std::string> names;
+  for (unsigned i = 0; i <= PLC_MAX_POU_LOCALS; ++i) names.push_back("v" + std::to_string(i));
+  std::vector<Plc_Local> locals;
+  for (const std::string& name : names) locals.push_back({name.c_str(), PLC_TYPE_INT, 0, 0, 0});
+  EXPECT_EQ(declare("A", "a.st", {1}, locals), ERR_PARAMETER);
+  locals.pop_back();
+  EXPECT_EQ(declare("A", "a.st", {1}, locals), ERR_OK);
 }
 
 TEST_F(DeclaredPous, HaveABound) {

@@ -32,6 +32,9 @@ static struct {
 static int lit[2];
 static int bias;
 
+/* The text of all local variables of Deep: too long to be told of all its calls. */
+static char label[256];
+
 static void* main_output;
 static void* edge_output;
 
@@ -41,17 +44,41 @@ static const unsigned int main_lines[] = {22, 23, 24, 26};
 static const unsigned int other_lines[] = {32, 33};
 static const unsigned int edge_lines[] = {42};
 static const unsigned int lamp_lines[] = {52};
-static Plc_Pou twice = {sizeof(Plc_Pou), "Twice", "src/steps.st", twice_lines, 1, 0};
-static Plc_Pou counter = {sizeof(Plc_Pou), "Counter", "src/steps.st", counter_lines, 2, 0};
-static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "src/steps.st", main_lines, 4, 0};
-static Plc_Pou other = {sizeof(Plc_Pou), "Other", "src/steps.st", other_lines, 2, 0};
-static Plc_Pou edge = {sizeof(Plc_Pou), "Edge", "src/steps.st", edge_lines, 1, 0};
-static Plc_Pou lamp = {sizeof(Plc_Pou), "Lamp", "src/steps.st", lamp_lines, 1, 0};
+static const unsigned int deep_lines[] = {62};
+static const Plc_Local twice_locals[] = {
+    {"value", PLC_TYPE_DINT, 0, 0, 0}, {"factor", PLC_TYPE_INT, 0, 0, 0}, {"word", PLC_TYPE_STRING, 8, 0, 0}};
+static Plc_Pou twice = {sizeof(Plc_Pou), "Twice", "src/steps.st", twice_lines, 1, 0, twice_locals, 3};
+static Plc_Pou counter = {sizeof(Plc_Pou), "Counter", "src/steps.st", counter_lines, 2, 0, 0, 0};
+static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "src/steps.st", main_lines, 4, 0, 0, 0};
+static Plc_Pou other = {sizeof(Plc_Pou), "Other", "src/steps.st", other_lines, 2, 0, 0, 0};
+static Plc_Pou edge = {sizeof(Plc_Pou), "Edge", "src/steps.st", edge_lines, 1, 0, 0, 0};
+static Plc_Pou lamp = {sizeof(Plc_Pou), "Lamp", "src/steps.st", lamp_lines, 1, 0, 0, 0};
+#define DEEP_TEXT(name) {name, PLC_TYPE_STRING, sizeof label, 0, 0}
+static const Plc_Local deep_locals[] = {{"level", PLC_TYPE_INT, 0, 0, 0},
+                                        DEEP_TEXT("a"),
+                                        DEEP_TEXT("b"),
+                                        DEEP_TEXT("c"),
+                                        DEEP_TEXT("d"),
+                                        DEEP_TEXT("e"),
+                                        DEEP_TEXT("f"),
+                                        DEEP_TEXT("g"),
+                                        DEEP_TEXT("h")};
+static Plc_Pou deep = {sizeof(Plc_Pou), "Deep", "src/steps.st", deep_lines, 1, 0, deep_locals, 9};
+
+static void run_deep(short level) {
+  void* const locals[] = {&level, label, label, label, label, label, label, label, label};
+  PLC_ENTER_LOCALS(deep, 0, locals, 0);
+  PLC_STATEMENT(62);
+  if (level > 0) run_deep((short)(level - 1));
+}
 
 static int run_twice(int value) {
-  PLC_ENTER(twice, 0);
+  short factor = 2;
+  char word[8] = "double";
+  void* const locals[] = {&value, &factor, word};
+  PLC_ENTER_LOCALS(twice, 0, locals, 0);
   PLC_STATEMENT(2);
-  return 2 * value;
+  return factor * value;
 }
 
 static void run_counter(struct counter* self) {
@@ -89,12 +116,14 @@ static void CDECL run_edge(void) {
   PLC_STATEMENT(42);
   ++edge_program.runs;
   *(int*)edge_output = edge_program.runs;
+  run_deep(40);
 }
 
 static int declare_pous(void) {
   return plc_debug_declare_pou(&twice) == ERR_OK && plc_debug_declare_pou(&counter) == ERR_OK &&
          plc_debug_declare_pou(&main_pou) == ERR_OK && plc_debug_declare_pou(&other) == ERR_OK &&
          plc_debug_declare_pou(&edge) == ERR_OK && plc_debug_declare_pou(&lamp) == ERR_OK &&
+         plc_debug_declare_pou(&deep) == ERR_OK &&
          plc_debug_declare_instance(&lamp, &lamps[0], "left") == ERR_OK &&
          plc_debug_declare_instance(&lamp, &lamps[1], "right") == ERR_OK &&
          plc_debug_declare_instance(&main_pou, &main_program, "Main") == ERR_OK &&
@@ -119,6 +148,7 @@ int CDECL plc_app_init(void) {
   static Task_Info tasks[3];
   static sys_setup_tasks_struct setup;
   main_program.counter.step = 1;
+  memset(label, 'x', sizeof label - 1);
   set_task(&tasks[0], "Main", Cyclic, 2, run_main);
   tasks[0].dwInterval = 10;
   set_task(&tasks[1], "Other", Cyclic, 1, run_other);
