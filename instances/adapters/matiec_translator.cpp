@@ -151,7 +151,7 @@ class MatiecTranslator : public Translator {
   bool instrument() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return false;
-    auto made = matiec::with_statements(*code, *joined_);
+    auto made = matiec::with_statements(*code, *joined_, context_.project);
     for (iec::DebugPou& pou : made.pous) {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ranges>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -55,6 +56,20 @@ std::vector<unsigned> ascending(std::vector<unsigned> lines) {
   return lines;
 }
 
+// Their types are known only behind the program.
+std::string declared_locals(std::size_t pou, std::span<const DebugLocal> locals) {
+  if (locals.empty()) return "";
+  std::string text = fmt::format("  static const Plc_Local plchost_locals_{}[] = {{\n", pou);
+  for (const DebugLocal& local : locals) {
+    text += fmt::format("    {{\"{}\", {}, {}, {}u, {}u}},\n", local.name, local.type, local.bytes,
+                        local.first_line, local.last_line);
+  }
+  return text + fmt::format(
+                    "  }};\n  plchost_pou_{0}.pLocals = plchost_locals_{0};\n"
+                    "  plchost_pou_{0}.nLocals = {1}u;\n",
+                    pou, locals.size());
+}
+
 }  // namespace
 
 std::string debug_header(std::span<const DebugPou> pous) {
@@ -64,14 +79,21 @@ std::string debug_header(std::span<const DebugPou> pous) {
     const std::vector<unsigned> lines = ascending(pous[i].lines);
     text += fmt::format(
         "static const unsigned int plchost_lines_{0}[] = {{{1}u}};\n"
-        "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u}};\n",
+        "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u, 0, "
+        "0u}};\n",
         i, fmt::join(lines, "u, "), pous[i].name, in_quotes(pous[i].file), lines.size());
   }
   return text;
 }
 
-std::string debug_enter(std::size_t pou, std::string_view self) {
-  return fmt::format("  PLC_ENTER(plchost_pou_{}, {});\n", pou, self);
+std::string debug_enter(std::size_t pou, std::string_view self, std::span<const DebugLocal> locals,
+                        std::size_t first) {
+  if (locals.empty()) return fmt::format("  PLC_ENTER(plchost_pou_{}, {});\n", pou, self);
+  const auto addresses = std::views::transform(locals, &DebugLocal::address);
+  return fmt::format(
+      "  void* const plchost_locals_[] = {{{}}};\n  PLC_ENTER_LOCALS(plchost_pou_{}, {}, plchost_locals_, "
+      "{}u);\n",
+      fmt::join(addresses, ", "), pou, self, first);
 }
 
 std::string debug_statement(unsigned line) {
@@ -80,8 +102,10 @@ std::string debug_statement(unsigned line) {
 
 std::string debug_declarations(std::span<const DebugPou> pous, std::span<const DebugInstance> instances) {
   std::string text = "int plchost_declare_debugging(void) {\n  int good = 1;\n";
-  for (std::size_t i = 0; i < pous.size(); ++i)
+  for (std::size_t i = 0; i < pous.size(); ++i) {
+    text += declared_locals(i, pous[i].locals);
     text += fmt::format("  good = good && plc_debug_declare_pou(&plchost_pou_{}) == 0;\n", i);
+  }
   for (const DebugInstance& instance : instances) {
     text += fmt::format("  good = good && plc_debug_declare_instance(&plchost_pou_{}, &{}, \"{}\") == 0;\n",
                         instance.pou, instance.value, instance.path);

@@ -8,11 +8,22 @@
 
 namespace plchost::iec {
 
+/// A Plc_Local: a variable that is on the stack, or that is no symbol.
+struct DebugLocal {
+  std::string name;
+  std::string type;         ///< in C, PLC_TYPE_...
+  std::string bytes;        ///< in C: of a string's memory; "0": of no string
+  std::string address;      ///< in C, where the POU is entered
+  unsigned first_line = 0;  ///< of the statements that it is there for; both 0: all
+  unsigned last_line = 0;
+};
+
 /// A POU of a debug build, as plc_debug.h describes it. Each has the variable plchost_pou_N in C.
 struct DebugPou {
   std::string name;
   std::string file;
   std::vector<unsigned> lines;
+  std::vector<DebugLocal> locals = {};
 };
 
 /// A program or function block with variables in it.
@@ -28,11 +39,13 @@ inline constexpr std::string_view kDebugFile = "plchost_pous.h";
 /// Its contents, in C and C++. A compiler's output behind it may use all names of plc_app.h that do not begin
 /// with PLC_.
 [[nodiscard]] std::string debug_header(std::span<const DebugPou> pous);
-/// The first statement of the code of a POU. `self`: an expression.
-[[nodiscard]] std::string debug_enter(std::size_t pou, std::string_view self);
+/// The first statement of the code of a POU. `self`: an expression. `locals`: those of this code, of which
+/// the first has number `first` in its POU.
+[[nodiscard]] std::string debug_enter(std::size_t pou, std::string_view self,
+                                      std::span<const DebugLocal> locals = {}, std::size_t first = 0);
 /// Goes before the statement of a line.
 [[nodiscard]] std::string debug_statement(unsigned line);
-/// The function plchost_declare_debugging().
+/// The function plchost_declare_debugging(), behind all types of the program.
 [[nodiscard]] std::string debug_declarations(std::span<const DebugPou> pous,
                                              std::span<const DebugInstance> instances);
 

@@ -113,6 +113,7 @@ class ProjectReader {
     Pou pou{.kind = kind, .name = "", .variables = {}, .chart = "", .place = take().place};
     pou.name_place = token().place;
     pou.name = take_name("this POU");
+    if (kind == Pou::Kind::function && at(":")) pou.result = tokens_[next_ + 1].text;
     while (!take_end(end, pou.name, pou.place)) {
       if (const SectionWord* const section = section_here()) {
         read_section(section->section, pou.variables);

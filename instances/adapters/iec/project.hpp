@@ -43,6 +43,7 @@ struct Pou {
   std::string chart;
   SourcePlace place;
   SourcePlace name_place = {};
+  std::string result = {};  ///< the type of a function
 };
 
 struct Task {

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/matiec/symbols.hpp"
+
 namespace plchost::matiec {
 
 namespace {
@@ -16,6 +18,8 @@ constexpr std::string_view kBodyEnd = "_body__(";
 constexpr std::string_view kLine = "#line ";
 constexpr std::string_view kComment = "/* line ";
 constexpr std::string_view kFunction = "// FUNCTION";
+/// Behind the variables of a function, and before each statement.
+constexpr std::string_view kControl = "  // Control execution";
 
 // Behind these words; 0: there is none.
 unsigned number_behind(std::string_view words, std::string_view line) {
@@ -32,7 +36,8 @@ std::string_view name_before_parenthesis(std::string_view line) {
 
 class Instrumenter {
  public:
-  Instrumenter(std::string_view code, const JoinedSource& source) : code_(code), source_(source) {}
+  Instrumenter(std::string_view code, const JoinedSource& source, const iec::Project& project)
+      : code_(code), source_(source), project_(project) {}
 
   DebugCode run() {
     made_.text = fmt::format("#include \"{}\"\n", iec::kDebugFile);
@@ -56,6 +61,7 @@ class Instrumenter {
                body != std::string_view::npos && line.starts_with("void ") && line.ends_with('{')) {
       begin(line.substr(0, body).substr(std::string_view("void ").size()), "data__");
     }
+    if (line == kControl && !declared_at_) declared_at_ = made_.text.size();
     made_.text += line;
     made_.text += '\n';
     if (!name_.empty() && !opened_at_ && line.ends_with('{')) opened_at_ = made_.text.size();
@@ -66,6 +72,7 @@ class Instrumenter {
     name_ = name;
     self_ = self;
     opened_at_.reset();
+    declared_at_.reset();
     number_.reset();
   }
 
@@ -76,20 +83,31 @@ class Instrumenter {
     if (!number_) {
       number_ = made_.pous.size();
       made_.pous.push_back({.name = name_, .file = place.file, .lines = {}});
-      made_.text.insert(*opened_at_, iec::debug_enter(*number_, self_));
+      enter(made_.pous.back());
     }
     made_.pous[*number_].lines.push_back(place.line);
     made_.text += iec::debug_statement(place.line);
   }
 
+  // The local variables of a function are those of C, which stand before. Those of others are members.
+  void enter(iec::DebugPou& pou) {
+    const iec::Pou* const known = project_.pou(name_);
+    const bool is_function = known != nullptr && known->kind == iec::Pou::Kind::function;
+    if (known != nullptr && (!is_function || declared_at_)) pou.locals = locals_of(project_, *known);
+    made_.text.insert(is_function ? declared_at_.value_or(*opened_at_) : *opened_at_,
+                      iec::debug_enter(*number_, self_, pou.locals));
+  }
+
   std::string_view code_;
   const JoinedSource& source_;
+  const iec::Project& project_;
   DebugCode made_;
   bool function_follows_ = false;
   std::string name_;  // of the POU that the text is in; empty: none yet
   std::string self_;
-  std::optional<std::size_t> opened_at_;  // behind its brace
-  std::optional<std::size_t> number_;     // of its DebugPou
+  std::optional<std::size_t> opened_at_;    // behind its brace
+  std::optional<std::size_t> declared_at_;  // behind its variables
+  std::optional<std::size_t> number_;       // of its DebugPou
 };
 
 }  // namespace
@@ -121,8 +139,8 @@ unsigned joined_line_of(std::string_view code, unsigned line) {
   return joined;
 }
 
-DebugCode with_statements(std::string_view code, const JoinedSource& source) {
-  return Instrumenter(code, source).run();
+DebugCode with_statements(std::string_view code, const JoinedSource& source, const iec::Project& project) {
+  return Instrumenter(code, source, project).run();
 }
 
 }  // namespace plchost::matiec

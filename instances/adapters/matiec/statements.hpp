@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "instances/adapters/iec/debug_pous.hpp"
+#include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/matiec/joined_source.hpp"
 
 namespace plchost::matiec {
@@ -15,8 +16,10 @@ struct DebugCode {
   std::vector<iec::DebugPou> pous;  ///< their names in upper case, as iec2c writes them
 };
 
-/// `code`: POUS.c as "iec2c -O l" writes it, of this source: "#line N" is before each statement.
-[[nodiscard]] DebugCode with_statements(std::string_view code, const JoinedSource& source);
+/// `code`: POUS.c as "iec2c -O l" writes it, of this source: "#line N" is before each statement. POUs that
+/// `project` does not have are without local variables.
+[[nodiscard]] DebugCode with_statements(std::string_view code, const JoinedSource& source,
+                                        const iec::Project& project);
 
 /// The same code for a compiler: each directive becomes a comment, so that the code has lines of its own.
 [[nodiscard]] std::string without_directives(std::string_view code);

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/tokens.hpp"
+#include "instances/plc_debug.h"
 #include "instances/plc_variables.h"
 
 namespace plchost::matiec {
@@ -115,11 +116,99 @@ class Words {
   std::size_t at_ = 0;
 };
 
-class Collector {
+/// The values that a variable has in C, and their types.
+class ValueCollector {
+ protected:
+  explicit ValueCollector(const iec::Project& project) : project_(project) {}
+
+  // Of a value that stands in C as `symbol.value`.
+  void add_type(const iec::Variable& variable, Symbol symbol, const std::string& type, std::size_t depth) {
+    if (depth > kMostNested) return;
+    Words words(type);
+    const std::string first = folded(words.take());
+    if (const auto known = elementary(first)) {
+      symbol.type = *known;
+      found_.all.push_back(std::move(symbol));
+    } else if (first == "ARRAY") {
+      add_array(variable, std::move(symbol), words, depth);
+    } else if (first == "STRUCT") {
+      add_structure(variable, symbol, words, depth);
+    } else if (first == "(") {
+      symbol.type = PLC_TYPE_DINT;  // an enumeration
+      found_.all.push_back(std::move(symbol));
+    } else if (const iec::DeclaredType* const declared = find_type(first)) {
+      // "POINT : STRUCT ..."
+      add_type(variable, std::move(symbol), declared->definition.substr(declared->definition.find(':') + 1),
+               depth + 1);
+    } else {
+      leave_out(variable, symbol, fmt::format("its type {} is not known", first));
+    }
+  }
+
+  void add_array(const iec::Variable& variable, Symbol symbol, Words& words, std::size_t depth) {
+    symbol.value += ".table";
+    if (!words.take("[")) return leave_out(variable, symbol, "its bounds are not understood");
+    do {
+      const auto first = words.number();
+      const bool range = words.take("..");
+      const auto last = words.number();
+      if (!first || !range || !last || *last < *first)
+        return leave_out(variable, symbol, "its bounds are no numbers");
+      symbol.name += "[]";
+      symbol.value += "[0]";
+      symbol.dimensions.push_back({.first = *first,
+                                   .count = static_cast<unsigned>(*last - *first) + 1,
+                                   .stride = fmt::format("sizeof({})", symbol.value)});
+    } while (words.take(","));
+    if (symbol.dimensions.size() > kMostDimensions)
+      return leave_out(variable, symbol, fmt::format("it has more than {} dimensions", kMostDimensions));
+    if (!words.take("]") || !words.take("OF"))
+      return leave_out(variable, symbol, "its type is not understood");
+    const std::string element = words.until({":="});
+    add_type(variable, std::move(symbol), element, depth + 1);
+  }
+
+  void add_structure(const iec::Variable& variable, const Symbol& within, Words& words, std::size_t depth) {
+    while (!words.ended() && !words.is("END_STRUCT")) {
+      std::vector<std::string> names{words.take()};
+      while (words.take(",")) names.push_back(words.take());
+      if (!words.take(":")) return leave_out(variable, within, "its structure is not understood");
+      const std::string type = words.until({";", ":="});
+      (void)words.until({";"});
+      (void)words.take(";");
+      for (const std::string& name : names) {
+        Symbol member = within;
+        member.name += "." + name;
+        member.value += "." + folded(name);
+        add_type(variable, std::move(member), type, depth + 1);
+      }
+    }
+  }
+
+  [[nodiscard]] const iec::DeclaredType* find_type(const std::string& name) const {
+    const auto found = std::ranges::find_if(
+        project_.types, [&](const iec::DeclaredType& known) { return folded(known.name) == name; });
+    return found == project_.types.end() ? nullptr : &*found;
+  }
+
+  // Once for each declaration, however often its block is used.
+  void leave_out(const iec::Variable& variable, const Symbol& symbol, const std::string& why) {
+    if (!told_.insert(fmt::format("{}:{}:{}", variable.place.file, variable.place.line, symbol.name)).second)
+      return;
+    found_.remarks.push_back(
+        {variable.place, fmt::format("{} cannot be seen from outside: {}", symbol.name, why)});
+  }
+
+  const iec::Project& project_;
+  std::set<std::string> told_;
+  Symbols found_;
+};
+
+class Collector : ValueCollector {
  public:
   Collector(const iec::Project& project, const iec::Resource& resource, const TaskPlan& plan,
             const ValueOfPlace& value_of_place)
-      : project_(project), resource_(resource), plan_(plan), value_of_place_(value_of_place) {}
+      : ValueCollector(project), resource_(resource), plan_(plan), value_of_place_(value_of_place) {}
 
   Symbols collect() {
     for (std::size_t i = 0; i < plan_.tasks.size(); ++i) {
@@ -235,94 +324,69 @@ class Collector {
     add_type(variable, std::move(symbol), variable.type, 0);
   }
 
-  // Of a value that stands in C as `symbol.value`.
-  void add_type(const iec::Variable& variable, Symbol symbol, const std::string& type, std::size_t depth) {
-    if (depth > kMostNested) return;
-    Words words(type);
-    const std::string first = folded(words.take());
-    if (const auto known = elementary(first)) {
-      symbol.type = *known;
-      found_.all.push_back(std::move(symbol));
-    } else if (first == "ARRAY") {
-      add_array(variable, std::move(symbol), words, depth);
-    } else if (first == "STRUCT") {
-      add_structure(variable, symbol, words, depth);
-    } else if (first == "(") {
-      symbol.type = PLC_TYPE_DINT;  // an enumeration
-      found_.all.push_back(std::move(symbol));
-    } else if (const iec::DeclaredType* const declared = find_type(first)) {
-      // "POINT : STRUCT ..."
-      add_type(variable, std::move(symbol), declared->definition.substr(declared->definition.find(':') + 1),
-               depth + 1);
-    } else {
-      leave_out(variable, symbol, fmt::format("its type {} is not known", first));
-    }
-  }
-
-  void add_array(const iec::Variable& variable, Symbol symbol, Words& words, std::size_t depth) {
-    symbol.value += ".table";
-    if (!words.take("[")) return leave_out(variable, symbol, "its bounds are not understood");
-    do {
-      const auto first = words.number();
-      const bool range = words.take("..");
-      const auto last = words.number();
-      if (!first || !range || !last || *last < *first)
-        return leave_out(variable, symbol, "its bounds are no numbers");
-      symbol.name += "[]";
-      symbol.value += "[0]";
-      symbol.dimensions.push_back({.first = *first,
-                                   .count = static_cast<unsigned>(*last - *first) + 1,
-                                   .stride = fmt::format("sizeof({})", symbol.value)});
-    } while (words.take(","));
-    if (symbol.dimensions.size() > kMostDimensions)
-      return leave_out(variable, symbol, fmt::format("it has more than {} dimensions", kMostDimensions));
-    if (!words.take("]") || !words.take("OF"))
-      return leave_out(variable, symbol, "its type is not understood");
-    const std::string element = words.until({":="});
-    add_type(variable, std::move(symbol), element, depth + 1);
-  }
-
-  void add_structure(const iec::Variable& variable, const Symbol& within, Words& words, std::size_t depth) {
-    while (!words.ended() && !words.is("END_STRUCT")) {
-      std::vector<std::string> names{words.take()};
-      while (words.take(",")) names.push_back(words.take());
-      if (!words.take(":")) return leave_out(variable, within, "its structure is not understood");
-      const std::string type = words.until({";", ":="});
-      (void)words.until({";"});
-      (void)words.take(";");
-      for (const std::string& name : names) {
-        Symbol member = within;
-        member.name += "." + name;
-        member.value += "." + folded(name);
-        add_type(variable, std::move(member), type, depth + 1);
-      }
-    }
-  }
-
-  [[nodiscard]] const iec::DeclaredType* find_type(const std::string& name) const {
-    const auto found = std::ranges::find_if(
-        project_.types, [&](const iec::DeclaredType& known) { return folded(known.name) == name; });
-    return found == project_.types.end() ? nullptr : &*found;
-  }
-
-  // Once for each declaration, however often its block is used.
-  void leave_out(const iec::Variable& variable, const Symbol& symbol, const std::string& why) {
-    if (!told_.insert(fmt::format("{}:{}:{}", variable.place.file, variable.place.line, symbol.name)).second)
-      return;
-    found_.remarks.push_back(
-        {variable.place, fmt::format("{} cannot be seen from outside: {}", symbol.name, why)});
-  }
-
-  const iec::Project& project_;
   const iec::Resource& resource_;
   const TaskPlan& plan_;
   const ValueOfPlace& value_of_place_;
   std::optional<std::size_t> task_;  // of the programs that are looked at; nothing: globals
-  std::set<std::string> told_;
-  Symbols found_;
+};
+
+/// Those of a POU that are no symbols.
+class LocalCollector : ValueCollector {
+ public:
+  explicit LocalCollector(const iec::Project& project) : ValueCollector(project) {}
+
+  std::vector<iec::DebugLocal> collect(const iec::Pou& pou) {
+    const bool is_function = pou.kind == iec::Pou::Kind::function;
+    for (const iec::Variable& variable : pou.variables) {
+      if (is_local(variable, is_function)) add(variable, is_function);
+    }
+    if (!pou.result.empty())
+      add({.name = pou.name, .type = pou.result, .location = "", .place = pou.place}, is_function);
+    std::vector<iec::DebugLocal> locals;
+    for (const Symbol& symbol : found_.all) {
+      if (!symbol.dimensions.empty() || symbol.name.size() > PLC_MAX_SYMBOL_NAME) continue;
+      if (locals.size() == PLC_MAX_POU_LOCALS) break;
+      locals.push_back({.name = symbol.name,
+                        .type = fmt::format("{}u", symbol.type),
+                        .bytes = symbol.type == PLC_TYPE_COUNTED_STRING ? "sizeof(STRING)" : "0",
+                        .address = "&" + symbol.value});
+    }
+    return locals;
+  }
+
+ private:
+  static bool is_local(const iec::Variable& variable, bool of_function) {
+    using Section = iec::Variable::Section;
+    if (variable.name.empty() || !variable.location.empty()) return false;
+    switch (variable.section) {
+      case Section::in_out:
+      case Section::temporary:
+        return true;
+      case Section::input:
+      case Section::output:
+      case Section::local:
+        return of_function;
+      case Section::external:
+      case Section::global:
+      case Section::other:
+        return false;
+    }
+    return false;
+  }
+  void add(const iec::Variable& variable, bool of_function) {
+    Symbol symbol;
+    symbol.name = variable.name;
+    symbol.value =
+        of_function ? folded(variable.name) : fmt::format("data__->{}.value", folded(variable.name));
+    add_type(variable, std::move(symbol), variable.type, 0);
+  }
 };
 
 }  // namespace
+
+std::vector<iec::DebugLocal> locals_of(const iec::Project& project, const iec::Pou& pou) {
+  return LocalCollector(project).collect(pou);
+}
 
 Symbols symbols_of(const iec::Project& project, const iec::Resource& resource, const TaskPlan& plan,
                    const ValueOfPlace& value_of_place) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "instances/adapters/iec/debug_pous.hpp"
 #include "instances/adapters/iec/place.hpp"
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/task_plan.hpp"
@@ -48,5 +49,9 @@ struct Symbols {
 /// Of all programs of the resource, the function blocks in them, and globals.
 [[nodiscard]] Symbols symbols_of(const iec::Project& project, const iec::Resource& resource,
                                  const iec::TaskPlan& plan, const ValueOfPlace& value_of_place);
+
+/// Its variables that are no symbols, in its C code: all of a function, and those of the sections VAR_IN_OUT
+/// and VAR_TEMP of others. Arrays are left out. At most PLC_MAX_POU_LOCALS.
+[[nodiscard]] std::vector<iec::DebugLocal> locals_of(const iec::Project& project, const iec::Pou& pou);
 
 }  // namespace plchost::matiec

@@ -16,10 +16,35 @@ TEST(DebugPous, AreDeclaredWithTheirInstances) {
   const std::vector<DebugInstance> instances{{.pou = 1, .value = "x.UP", .path = "Main0.up"}};
   EXPECT_THAT(debug_header(pous),
               HasSubstr("plchost_lines_0[] = {2u, 3u};\nstatic Plc_Pou plchost_pou_0 = "
-                        "{sizeof(Plc_Pou), \"Main\", \"a.st\", plchost_lines_0, 2u, 0u};"));
+                        "{sizeof(Plc_Pou), \"Main\", \"a.st\", plchost_lines_0, 2u, 0u, 0, 0u};"));
   const std::string text = debug_declarations(pous, instances);
   EXPECT_THAT(text, HasSubstr("plc_debug_declare_pou(&plchost_pou_1) == 0;\n"));
   EXPECT_THAT(text, HasSubstr("plc_debug_declare_instance(&plchost_pou_1, &x.UP, \"Main0.up\") == 0;\n"));
+}
+
+TEST(DebugPous, AreDeclaredWithTheirLocalVariables) {
+  const std::vector<DebugPou> pous{{"Main", "a.st", {3}},
+                                   {"Add",
+                                    "a.st",
+                                    {9},
+                                    {{.name = "x", .type = "3u", .bytes = "0", .address = "&X"},
+                                     {.name = "s",
+                                      .type = "25u",
+                                      .bytes = "sizeof(STRING)",
+                                      .address = "&S",
+                                      .first_line = 4,
+                                      .last_line = 9}}}};
+  EXPECT_EQ(debug_enter(1, "0", pous[1].locals, 7),
+            "  void* const plchost_locals_[] = {&X, &S};\n"
+            "  PLC_ENTER_LOCALS(plchost_pou_1, 0, plchost_locals_, 7u);\n");
+  EXPECT_EQ(debug_enter(0, "this"), "  PLC_ENTER(plchost_pou_0, this);\n");
+  const std::string text = debug_declarations(pous, {});
+  EXPECT_THAT(text, HasSubstr("  static const Plc_Local plchost_locals_1[] = {\n"));
+  EXPECT_THAT(text,
+              HasSubstr("    {\"x\", 3u, 0, 0u, 0u},\n    {\"s\", 25u, sizeof(STRING), 4u, 9u},\n  };\n"));
+  EXPECT_THAT(text, HasSubstr("  plchost_pou_1.pLocals = plchost_locals_1;\n  plchost_pou_1.nLocals = 2u;\n"
+                              "  good = good && plc_debug_declare_pou(&plchost_pou_1) == 0;\n"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("plchost_locals_0")));
 }
 
 // A program may have them as names of its own.

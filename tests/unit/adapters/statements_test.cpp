@@ -53,7 +53,7 @@ void EMPTY_body__(EMPTY *data__) {
 TEST(MatiecStatements, GetTheirMacros) {
   const std::vector<iec::Source> sources{{"a.st", "FUNCTION Twice\nTwice := x * 2;\nEND_FUNCTION\n"},
                                          {"b \"1\".st", "PROGRAM Main\nx\ny\nEND_PROGRAM\n"}};
-  const DebugCode made = with_statements(kCode, JoinedSource(sources));
+  const DebugCode made = with_statements(kCode, JoinedSource(sources), {});
   ASSERT_EQ(made.pous.size(), 2U);
   EXPECT_EQ(made.pous[0].name, "TWICE");
   EXPECT_EQ(made.pous[0].file, "a.st");
@@ -72,7 +72,89 @@ TEST(MatiecStatements, GetTheirMacros) {
   EXPECT_THAT(made.text, Not(HasSubstr("#line")));
   const std::string header = iec::debug_header(made.pous);
   EXPECT_THAT(header, HasSubstr("plchost_lines_1[] = {2u, 3u};"));
-  EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u};"));
+  EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u, 0, 0u};"));
+}
+
+constexpr const char* kLocals = R"(// FUNCTION
+INT SUM(
+  BOOL EN,
+  BOOL *__ENO,
+  INT X,
+  INT *__CALLS)
+{
+  BOOL ENO = __BOOL_LITERAL(TRUE);
+  INT CALLS;
+  if (__CALLS != NULL) {
+    CALLS = *__CALLS;
+  }
+  INT SUM = 0;
+
+  // Control execution
+  if (!EN) {
+    return SUM;
+  }
+  I = 1;
+  {
+    while(I < 3) {
+#line 13 "joined.st"
+      CALLS = (CALLS + X);
+    }
+  }
+  return SUM;
+}
+
+void PART_body__(PART *data__) {
+  // Control execution
+#line 19 "joined.st"
+  __SET_VAR(data__->,TMP,,1);
+}
+)";
+
+constexpr const char* kLocalsText = R"(TYPE
+  Mode : (off, on);
+  Small : INT (0..9);
+  At : STRUCT x, y : REAL; mode : Mode; END_STRUCT;
+END_TYPE
+FUNCTION Sum : INT
+  VAR_INPUT x : INT; END_VAR
+  VAR_IN_OUT calls : INT; END_VAR
+  VAR m : Mode; small : Small; place : At; cells : ARRAY [1..3] OF INT; late : TIME; s : STRING; END_VAR
+  VAR CONSTANT k : BYTE := 3; END_VAR
+  VAR_EXTERNAL g : INT; END_VAR
+  FOR i := 1 TO 3 DO
+    calls := calls + x;
+  END_FOR;
+END_FUNCTION
+FUNCTION_BLOCK Part
+  VAR_INPUT in : INT; END_VAR VAR_IN_OUT io : At; other : Part; END_VAR VAR_TEMP tmp : WORD; END_VAR
+  VAR n : INT; END_VAR
+  tmp := 1;
+END_FUNCTION_BLOCK
+)";
+
+TEST(MatiecLocals, AreThoseOfTheCThatAreNoSymbols) {
+  const std::vector<iec::Source> sources{{"a.st", kLocalsText}};
+  const iec::ReadProject read = iec::read_project(sources);
+  ASSERT_TRUE(read.problems.empty());
+  const DebugCode made = with_statements(kLocals, JoinedSource(sources), read.project);
+  ASSERT_EQ(made.pous.size(), 2U);
+  const auto shown = [](const iec::DebugPou& pou) {
+    std::vector<std::string> all;
+    for (const iec::DebugLocal& one : pou.locals)
+      all.push_back(one.name + " " + one.type + " " + one.bytes + " " + one.address);
+    return all;
+  };
+  EXPECT_THAT(shown(made.pous[0]),
+              ElementsAre("x 3u 0 &X", "calls 3u 0 &CALLS", "m 4u 0 &M", "small 3u 0 &SMALL",
+                          "place.X 14u 0 &PLACE.X", "place.Y 14u 0 &PLACE.Y", "place.MODE 4u 0 &PLACE.MODE",
+                          "late 21u 0 &LATE", "s 25u sizeof(STRING) &S", "k 10u 0 &K", "Sum 3u 0 &SUM"));
+  EXPECT_THAT(shown(made.pous[1]),
+              ElementsAre("io.X 14u 0 &data__->IO.value.X", "io.Y 14u 0 &data__->IO.value.Y",
+                          "io.MODE 4u 0 &data__->IO.value.MODE", "tmp 11u 0 &data__->TMP.value"));
+  EXPECT_THAT(made.text, HasSubstr("  INT SUM = 0;\n\n  void* const plchost_locals_[] = {&X, &CALLS, "));
+  EXPECT_THAT(made.text, HasSubstr("  PLC_ENTER_LOCALS(plchost_pou_0, 0, plchost_locals_, 0u);\n"
+                                   "  // Control execution\n"));
+  EXPECT_THAT(made.text, HasSubstr("PART *data__) {\n  void* const plchost_locals_[] = {&data__->IO"));
 }
 
 TEST(TheCodeWithoutDirectives, HasTheLinesOfItsStatementsInComments) {
