@@ -122,7 +122,10 @@ class StrucppTranslator : public Translator {
       if (!context_.has(code)) return false;
       codes.push_back(*std::move(code));
     }
-    auto made = strucpp::with_statements(codes, context_.project);
+    const auto header = context_.folder().read("generated.hpp");
+    if (!context_.has(header)) return false;
+    auto made =
+        strucpp::with_statements(codes, context_.project, strucpp::CppValues(*header, context_.sources));
     for (std::size_t i = 0; i < files_.size(); ++i) {
       if (!context_.has(context_.folder().replace(files_[i], made.texts[i]))) return false;
     }

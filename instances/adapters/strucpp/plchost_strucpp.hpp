@@ -158,11 +158,22 @@ struct plchost_type<strucpp::IECString<N>> {
   static constexpr unsigned int of(const plchost_shown& shown) { return shown.bytes == 0 ? shown.type : 0; }
 };
 template <class E>
+inline constexpr unsigned int plchost_enumeration = sizeof(E) == 1   ? 2
+                                                    : sizeof(E) == 2 ? 3
+                                                    : sizeof(E) == 4 ? 4
+                                                                     : 5;  // PLC_TYPE_SINT to _LINT
+template <class E>
 struct plchost_type<strucpp::IEC_ENUM_Value<E>> {
-  static constexpr unsigned int of(const plchost_shown&) {
-    return sizeof(E) == 1 ? 2 : sizeof(E) == 2 ? 3 : sizeof(E) == 4 ? 4 : 5;  // PLC_TYPE_SINT to _LINT
-  }
+  static constexpr unsigned int of(const plchost_shown&) { return plchost_enumeration<E>; }
 };
+
+// Where a local variable has its value, in a debug build, and how many bytes a string has there.
+template <class T>
+void* plchost_local(T& variable) noexcept {
+  return const_cast<void*>(static_cast<const void*>(&plchost_value(variable)));
+}
+template <class T>
+inline constexpr unsigned int plchost_bytes = sizeof(plchost_value(std::declval<T&>()));
 
 template <std::size_t... D, class Root, class Path>
 bool plchost_find(std::index_sequence<D...>, void (*use)(const plchost_symbol*), Root& root, Path path,

@@ -7,6 +7,7 @@
 
 #include "instances/adapters/iec/debug_pous.hpp"
 #include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/strucpp/cpp_values.hpp"
 
 namespace plchost::strucpp {
 
@@ -18,6 +19,7 @@ struct DebugCode {
 
 /// `codes`: files that STruC++ has written, with "#line N" before each statement. POUs that no source of this
 /// project declares stay as they are.
-[[nodiscard]] DebugCode with_statements(std::span<const std::string> codes, const iec::Project& project);
+[[nodiscard]] DebugCode with_statements(std::span<const std::string> codes, const iec::Project& project,
+                                        const CppValues& values);
 
 }  // namespace plchost::strucpp

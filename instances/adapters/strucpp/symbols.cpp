@@ -181,6 +181,11 @@ class Resolver {
 
 }  // namespace
 
+unsigned type_number(std::string_view name) noexcept {
+  const auto* const type = std::ranges::find(kTypes, name, &TableType::name);
+  return type == kTypes.end() || type->bytes == 0 ? 0 : type->type;
+}
+
 Symbols symbols_of(const iec::Project& project, const iec::TaskPlan& plan,
                    std::span<const PlannedSymbol> planned) {
   return Resolver(project, plan).resolve(planned);

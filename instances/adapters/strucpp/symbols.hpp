@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "instances/adapters/iec/project.hpp"
@@ -28,6 +29,9 @@ struct Symbols {
   std::vector<Symbol> all;
   iec::SourceProblems remarks;  ///< variables that are left out, and why
 };
+
+/// PLC_TYPE_... of "INT"; 0: no type of this name, or a string.
+[[nodiscard]] unsigned type_number(std::string_view name) noexcept;
 
 /// Those of the programs of the plan, of the function blocks in them, and globals.
 [[nodiscard]] Symbols symbols_of(const iec::Project& project, const iec::TaskPlan& plan,

@@ -250,7 +250,7 @@ class Plan {
     for (const block of pou.varBlocks) {
       for (const declaration of block.declarations) {
         for (const name of namesAsWritten(declaration)) {
-          const member = block.blockType === 'VAR_TEMP' ? undefined : this.memberOf(className, name.toUpperCase());
+          const member = this.memberOf(className, name.toUpperCase());
           found.push(...this.variables(block, declaration, name, member, declaration));
         }
       }

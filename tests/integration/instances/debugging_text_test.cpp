@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/adapters/run_program.hpp"
+#include "shm/variables/variable_symbol.hpp"
 #include "tests/integration/instances/debugged_process.hpp"
 
 namespace plchost::testing {
@@ -35,6 +36,14 @@ class DebuggedText : public Debugging, public ::testing::WithParamInterface<std:
   }
   bool comes_to(const std::string& place) {
     return eventually([&] { return stack("Main") == place; });
+  }
+  /// The value of a local variable of a call; "none": it has none of this name.
+  std::string local(std::size_t frame, const std::string& name) {
+    const json found = task("Main")["stack"][frame];
+    for (const json& one : found.value("locals", json::array())) {
+      if (same_variable_name(one.value("name", ""), name)) return one.value("value", "");
+    }
+    return "none";
   }
   std::string innermost() { return task("Main")["stack"][0].value("instance", ""); }
 };
@@ -123,6 +132,83 @@ TEST_P(DebuggedText, IsSteppedIntoOverAndOutOf) {
   EXPECT_TRUE(goes_on("Main"));
 }
 
+constexpr const char* kScale = R"(TYPE
+  Mode : (idle, busy, late);
+  Place : STRUCT x : INT; far : BOOL; END_STRUCT;
+END_TYPE
+
+FUNCTION Scale : INT
+  VAR_INPUT value : INT; END_VAR
+  VAR_IN_OUT calls : INT; END_VAR
+  VAR factor : INT := 2; wait : TIME; gear : Mode; text : STRING; at_x : Place; END_VAR
+  FOR factor := 1 TO 2 DO
+    wait := T#1s500ms;
+  END_FOR;
+  text := 'run';
+  gear := busy;
+  at_x.x := value;
+  factor := 2;
+  calls := calls + 1;
+  Scale := value * factor;
+END_FUNCTION
+
+FUNCTION_BLOCK Adder
+  VAR_INPUT width : INT; END_VAR
+  VAR_IN_OUT sum : INT; END_VAR
+  VAR_TEMP twice : INT; END_VAR
+  twice := Scale(value := width, calls := sum);
+  sum := sum + twice;
+END_FUNCTION_BLOCK
+
+PROGRAM Press
+  VAR one : Adder; total : INT; value : INT := 5; END_VAR
+  total := 0;
+  one(width := 4, sum := total);
+  one(width := value, sum := total);
+  total := total + 0;
+END_PROGRAM
+
+CONFIGURATION cell
+  RESOURCE line ON PLC
+    TASK Main (INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM press1 WITH Main : Press;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(DebuggedText, HasLocalVariablesInEachCall) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kScale));
+  const auto made =
+      command("break Scale:18 if value = 5 AND factor < value AND at_x.x = 5 log {calls} calls");
+  EXPECT_EQ(made.value("remark", "x"), "");
+  EXPECT_TRUE(eventually([&] { return !state()["log"].empty(); }));
+  EXPECT_EQ(state()["log"][0].value("text", ""), "10 calls") << "of the second call: 1 + 8 + 1";
+  command("delete *");
+  command("break Scale:18 if value = 5");
+  ASSERT_TRUE(comes_to("Scale:18 Adder:25 Press:33")) << state().dump(2);
+  command("delete *");
+  EXPECT_EQ(local(0, "value"), "5");
+  EXPECT_EQ(local(0, "calls"), "10");
+  EXPECT_EQ(local(0, "factor"), "2");
+  EXPECT_EQ(local(0, "wait"), "T#1s500ms");
+  EXPECT_EQ(local(0, "gear"), "1");
+  EXPECT_EQ(local(0, "text"), "'run'");
+  EXPECT_EQ(local(0, "at_x.x"), "5");
+  EXPECT_EQ(local(0, "at_x.far"), "FALSE");
+  EXPECT_EQ(local(0, "Scale"), "0");
+  EXPECT_NE(local(1, "twice"), "none");
+  EXPECT_EQ(local(2, "value"), "none") << "that of a program is no local variable";
+  command("local Main 0 factor=10");
+  command("local Main 0 text='walk'");
+  EXPECT_EQ(local(0, "text"), "'walk'");
+  EXPECT_THAT(refused("local Main 0 value=40000"), ::testing::HasSubstr("32767"));
+  EXPECT_EQ(stack_after("out"), "Adder:26 Press:33");
+  EXPECT_EQ(local(0, "twice"), "50");
+  command("local Main 0 twice=100");
+  EXPECT_EQ(stack_after("out"), "Press:34");
+  EXPECT_EQ(values_->read("press1.total"), "110") << "10 + 100";
+}
+
 constexpr const char* kLine = R"(FUNCTION_BLOCK Pump
   VAR hours : INT; END_VAR
   METHOD Reset : BOOL
@@ -173,6 +259,19 @@ TEST_P(DebuggedMethods, AreStatementsOfTheirBlock) {
   EXPECT_EQ(stack_after("next"), "Pump:6 Line:20");
   EXPECT_EQ(values_->read("line1.two.hours"), "40");
   EXPECT_EQ(stack_after("out"), "Line:13");
+}
+
+TEST_P(DebuggedMethods, HaveLocalVariablesOfTheirOwn) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kLine));
+  EXPECT_EQ(command("break Pump:5 if value = 40").value("remark", "x"), "");
+  write("line1.place=4");
+  ASSERT_TRUE(comes_to("Pump:5 Line:20")) << state().dump(2);
+  EXPECT_EQ(local(0, "value"), "40");
+  EXPECT_EQ(local(0, "Reset"), "FALSE");
+  command("local Main 0 value=41");
+  EXPECT_EQ(stack_after("next"), "Pump:6 Line:20");
+  EXPECT_EQ(values_->read("line1.two.hours"), "41");
+  EXPECT_THAT(refused("break Pump:8 if value = 40"), ::testing::HasSubstr("value"));
 }
 
 // The library throws out of the frames.

@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "instances/adapters/strucpp/instances.hpp"
@@ -45,7 +46,7 @@ iec::Project example() {
 }
 
 DebugCode made_of(std::vector<std::string> codes) {
-  return with_statements(codes, example());
+  return with_statements(codes, example(), CppValues("", {}));
 }
 
 constexpr const char* kMain = R"(namespace strucpp {
@@ -173,10 +174,116 @@ Array1D<IEC_INT, 1, 3> TWICE(IEC_INT X, IEC_INT& Y) {
   EXPECT_THAT(made.pous[0].lines, ElementsAre(9, 5, 7));
   EXPECT_EQ(made.pous[1].file, "b \"1\".st");
   EXPECT_THAT(made.texts[0], HasSubstr("operator()() {\n  PLC_ENTER(plchost_pou_0, this);\n"));
-  EXPECT_THAT(made.texts[0], HasSubstr("RESET(IEC_INT TO) {\n  PLC_ENTER(plchost_pou_0, this);\n"));
-  EXPECT_THAT(made.texts[0], HasSubstr("get_SIZE() const {\n  PLC_ENTER(plchost_pou_0, this);\n"));
-  EXPECT_THAT(made.texts[1], HasSubstr("IEC_INT& Y) {\n  PLC_ENTER(plchost_pou_1, 0);\n"));
+  EXPECT_THAT(
+      made.texts[0],
+      HasSubstr("  PLC_ENTER_LOCALS(plchost_pou_0, this, plchost_locals_, 0u);\nPLC_STATEMENT(5u);\n"));
+  EXPECT_THAT(
+      made.texts[0],
+      HasSubstr("  PLC_ENTER_LOCALS(plchost_pou_0, this, plchost_locals_, 2u);\nPLC_STATEMENT(7u);\n"));
+  EXPECT_THAT(made.texts[1],
+              HasSubstr("  PLC_ENTER_LOCALS(plchost_pou_1, 0, plchost_locals_, 0u);\nPLC_STATEMENT(4u);\n"));
   EXPECT_THAT(iec::debug_header(made.pous), HasSubstr("plchost_lines_0[] = {5u, 7u, 9u};"));
+}
+
+constexpr const char* kHeader = R"(namespace strucpp {
+enum class COLOR { RED, GREEN };
+
+using IEC_COLOR = IEC_ENUM<COLOR>;
+
+using SMALL = INT_t;
+constexpr INT_t SMALL_MIN = 0;
+
+struct PNT {
+    IEC_INT XX{};
+    IEC_COLOR INK{};
+};
+
+using IEC_PNT = PNT;
+
+using ARR = Array1D<IEC_INT, 1, 3>;
+
+class COUNTER {
+public:
+    // Local variables
+    IEC_INT N;
+    IEC_WORD TMP_;
+    COUNTER();
+    virtual IEC_INT RESET(IEC_INT TO, IEC_LREAL& BY);
+};
+}  // namespace strucpp
+)";
+
+/// "NAME TYPE BYTES ADDRESS LINES" of each.
+std::vector<std::string> shown(const std::vector<iec::DebugLocal>& locals) {
+  std::vector<std::string> all;
+  for (const iec::DebugLocal& one : locals) {
+    all.push_back(fmt::format("{} {} {} {} {}-{}", one.name, one.type, one.bytes, one.address, one.first_line,
+                              one.last_line));
+  }
+  return all;
+}
+
+TEST(StrucppLocals, AreThoseOfFunctionsAndMethods) {
+  iec::Project project = example();
+  project.pous[1].variables.push_back(declared("Tmp", "WORD", "TMP_", Section::temporary));
+  const std::vector<iec::Source> sources{{"a.st", "Twice Ink small xx tmp"}};
+  const std::vector<std::string> codes{
+      R"(void COUNTER::operator()() {
+#line 9 "x"
+    N = N + 1;
+#line 11 "x"
+    N = N + 1;
+}
+
+IEC_INT COUNTER::RESET(IEC_INT TO, IEC_LREAL& BY) {
+    IEC_INT RESET_result;
+#line 5 "x"
+    N = TO;
+    return RESET_result;
+}
+
+IEC_INT COUNTER::get_SIZE() const {
+#line 7 "x"
+    N = 2;
+}
+)",
+      R"(IEC_INT TWICE(const IEC_STRING& TEXT, Array1D<IEC_INT, 1, 3> X, IEC_TIME& T) {
+    IEC_INT TWICE_result;
+    IEC_COLOR C = COLOR::RED;
+    PNT PP;
+    ARR A;
+    SMALL SMALL_ = 3;
+    IECStringVar<10> S = "(=";
+    IECStringVar<9000> LONG;
+    IEC_INT* P;
+#line 4 "x"
+    IEC_REAL __output_tmp_0;
+    for (I = 0; I <= 9; I++) {
+#line 5 "x"
+        X = 1;
+    }
+}
+)"};
+  const DebugCode made = with_statements(codes, project, CppValues(kHeader, sources));
+  ASSERT_EQ(made.pous.size(), 2U);
+  EXPECT_THAT(
+      shown(made.pous[0].locals),
+      ElementsAre("Tmp 11u 0 ::plchost_local(TMP_) 9-11", "TO 3u 0 ::plchost_local(TO) 5-5",
+                  "BY 15u 0 ::plchost_local(BY) 5-5", "RESET 3u 0 ::plchost_local(RESET_result) 5-5"));
+  EXPECT_THAT(shown(made.pous[1].locals),
+              ElementsAre("TEXT 26u plchost_bytes<strucpp::IEC_STRING> ::plchost_local(TEXT) 0-0",
+                          "T 16u 0 ::plchost_local(T) 0-0", "Twice 3u 0 ::plchost_local(TWICE_result) 0-0",
+                          "C plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(C) 0-0",
+                          "PP.xx 3u 0 ::plchost_local(PP.XX) 0-0",
+                          "PP.Ink plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(PP.INK) 0-0",
+                          "small 3u 0 ::plchost_local(SMALL_) 0-0",
+                          "S 26u plchost_bytes<strucpp::IECStringVar<10>> ::plchost_local(S) 0-0"));
+  EXPECT_THAT(made.texts[0],
+              HasSubstr("RESET_result;\n  void* const plchost_locals_[] = {::plchost_local(TO), "
+                        "::plchost_local(BY), ::plchost_local(RESET_result)};\n"
+                        "  PLC_ENTER_LOCALS(plchost_pou_0, this, plchost_locals_, 1u);\n"
+                        "PLC_STATEMENT(5u);\n#line 5"));
+  EXPECT_THAT(made.texts[0], HasSubstr("get_SIZE() const {\n  PLC_ENTER(plchost_pou_0, this);\n"));
 }
 
 constexpr const char* kLibrary = R"(void TON::operator()() {

@@ -1,0 +1,159 @@
+#include "instances/adapters/strucpp/cpp_values.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <ranges>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/strucpp/symbols.hpp"
+#include "instances/plc_debug.h"
+#include "instances/plc_variables.h"
+#include "shm/base/trimmed.hpp"
+
+namespace plchost::strucpp {
+
+namespace {
+
+constexpr std::string_view kIndent = "    ";
+constexpr std::string_view kLibrary = "IEC_";
+constexpr std::string_view kPlain = "_t";
+constexpr std::string_view kString = "IECStringVar<";
+constexpr std::string_view kEnumeration = "IEC_ENUM<";
+/// The library adds the length to the characters, and an end.
+constexpr unsigned kMostCharacters = PLC_MAX_STRING - 16;
+
+bool is_letter(char c) noexcept {
+  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+// Up to its initial value.
+std::string_view declaration_in(std::string_view text) {
+  int depth = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '<') ++depth;
+    if (text[i] == '>') --depth;
+    if (depth != 0) continue;
+    if (text[i] == '(') return {};  // a function
+    if (text[i] == '=' || text[i] == '{' || text[i] == ';') return text.substr(0, i);
+  }
+  return text;
+}
+
+/// The number of an elementary type, as "IEC_INT" or "INT_t"; 0: it is none.
+unsigned elementary(std::string_view type) {
+  if (type.starts_with(kLibrary)) return type_number(type.substr(kLibrary.size()));
+  return type.ends_with(kPlain) ? type_number(type.substr(0, type.size() - kPlain.size())) : 0;
+}
+
+bool is_string(std::string_view type) {
+  if (type == "IEC_STRING") return true;
+  unsigned characters = 0;
+  if (!type.starts_with(kString)) return false;
+  std::from_chars(type.data() + kString.size(), type.data() + type.size(), characters);
+  return characters > 0 && characters <= kMostCharacters;
+}
+
+}  // namespace
+
+std::optional<CppVariable> CppVariable::parse(std::string_view text) {
+  text = trimmed(declaration_in(text));
+  std::size_t begin = text.size();
+  while (begin > 0 && is_letter(text[begin - 1])) --begin;
+  CppVariable variable{.type = "", .name = std::string(text.substr(begin))};
+  std::string_view type = trimmed(text.substr(0, begin), " &");
+  constexpr std::string_view kConst = "const ";
+  if (type.starts_with(kConst)) type.remove_prefix(kConst.size());
+  variable.type = type;
+  // Names that begin with two are the compiler's own.
+  if (variable.type.empty() || variable.name.empty() || variable.name.starts_with("__")) return std::nullopt;
+  return variable;
+}
+
+CppValues::CppValues(std::string_view header, std::span<const iec::Source> sources) {
+  for (const auto part : std::views::split(header, '\n'))
+    read_line(std::string_view(part.begin(), part.end()));
+  for (const iec::Source& source : sources) {
+    for (const iec::Token& token : iec::tokens_of(source.text, source.file).all) {
+      if (token.kind == iec::Token::Kind::name) names_.try_emplace(iec::folded(token.text), token.text);
+    }
+  }
+}
+
+void CppValues::read_line(std::string_view line) {
+  const auto behind = [&](std::string_view word) {
+    if (!line.starts_with(word)) return std::string();
+    const std::string_view rest = line.substr(word.size());
+    return std::string(
+        rest.substr(0, static_cast<std::size_t>(std::ranges::find_if_not(rest, is_letter) - rest.begin())));
+  };
+  if (const std::string name = behind("using "); !name.empty()) {
+    const std::size_t equal = line.find('=');
+    const std::size_t end = line.find(';');
+    if (equal != std::string_view::npos && end != std::string_view::npos && equal < end)
+      aliases_.try_emplace(name, trimmed(line.substr(equal + 1, end - equal - 1)));
+  } else if (const std::string enumeration = behind("enum class "); !enumeration.empty()) {
+    enumerations_.insert(enumeration);
+  } else if (line.ends_with('{') && (line.starts_with("struct ") || line.starts_with("class "))) {
+    in_ = behind(line.starts_with("struct ") ? "struct " : "class ");
+  } else if (line.starts_with('}')) {
+    in_.clear();
+  } else if (!in_.empty() && line.starts_with(kIndent) && line.ends_with(';')) {
+    if (auto member = CppVariable::parse(line)) members_[in_].push_back(*std::move(member));
+  }
+}
+
+const CppVariable* CppValues::member(const std::string& type, const std::string& name) const {
+  const auto found = members_.find(type);
+  if (found == members_.end()) return nullptr;
+  for (const std::string& called : {name, name + "_"}) {
+    const auto one = std::ranges::find(found->second, called, &CppVariable::name);
+    if (one != found->second.end()) return &*one;
+  }
+  return nullptr;
+}
+
+// The compiler puts an underscore behind some names.
+std::string CppValues::name_in_source(const std::string& name) const {
+  auto found = names_.find(name);
+  if (found == names_.end() && name.ends_with('_')) found = names_.find(name.substr(0, name.size() - 1));
+  return found == names_.end() ? name : found->second;
+}
+
+void CppValues::add(std::vector<iec::DebugLocal>& locals, const CppVariable& variable,
+                    const std::string& name) const {
+  add(locals, variable.type, name, variable.name, 0);
+}
+
+void CppValues::add(std::vector<iec::DebugLocal>& locals, const std::string& type, const std::string& name,
+                    const std::string& value, std::size_t depth) const {
+  if (depth > iec::kMostNested || locals.size() == PLC_MAX_POU_LOCALS || name.size() > PLC_MAX_SYMBOL_NAME)
+    return;
+  const auto found = [&](std::string number, std::string bytes) {
+    locals.push_back({.name = name,
+                      .type = std::move(number),
+                      .bytes = std::move(bytes),
+                      .address = fmt::format("::plchost_local({})", value)});
+  };
+  if (const unsigned number = elementary(type); number != 0) return found(fmt::format("{}u", number), "0");
+  if (is_string(type))
+    return found(fmt::format("{}u", PLC_TYPE_SIZED_STRING), fmt::format("plchost_bytes<strucpp::{}>", type));
+  const std::string plain = type.starts_with(kEnumeration) && type.ends_with('>')
+                                ? type.substr(kEnumeration.size(), type.size() - kEnumeration.size() - 1)
+                                : type;
+  if (enumerations_.contains(plain))
+    return found(fmt::format("plchost_enumeration<strucpp::{}>", plain), "0");
+  if (const auto alias = aliases_.find(type); alias != aliases_.end())
+    return add(locals, alias->second, name, value, depth + 1);
+  const auto fields = members_.find(type);
+  if (fields == members_.end()) return;
+  for (const CppVariable& field : fields->second) {
+    add(locals, field.type, fmt::format("{}.{}", name, name_in_source(field.name)),
+        fmt::format("{}.{}", value, field.name), depth + 1);
+  }
+}
+
+}  // namespace plchost::strucpp
