@@ -98,7 +98,9 @@ void CppValues::read_line(std::string_view line) {
   } else if (const std::string enumeration = behind("enum class "); !enumeration.empty()) {
     enumerations_.insert(enumeration);
   } else if (line.ends_with('{') && (line.starts_with("struct ") || line.starts_with("class "))) {
-    in_ = behind(line.starts_with("struct ") ? "struct " : "class ");
+    const bool is_structure = line.starts_with("struct ");
+    in_ = behind(is_structure ? "struct " : "class ");
+    if (is_structure) structures_.insert(in_);
   } else if (line.starts_with('}')) {
     in_.clear();
   } else if (!in_.empty() && line.starts_with(kIndent) && line.ends_with(';')) {
@@ -149,7 +151,7 @@ void CppValues::add(std::vector<iec::DebugLocal>& locals, const std::string& typ
   if (const auto alias = aliases_.find(type); alias != aliases_.end())
     return add(locals, alias->second, name, value, depth + 1);
   const auto fields = members_.find(type);
-  if (fields == members_.end()) return;
+  if (fields == members_.end() || !structures_.contains(type)) return;
   for (const CppVariable& field : fields->second) {
     add(locals, field.type, fmt::format("{}.{}", name, name_in_source(field.name)),
         fmt::format("{}.{}", value, field.name), depth + 1);

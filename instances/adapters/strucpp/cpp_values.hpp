@@ -43,9 +43,10 @@ class CppValues {
 
   std::map<std::string, std::string> aliases_;
   std::set<std::string> enumerations_;
-  std::map<std::string, std::vector<CppVariable>> members_;
-  std::map<std::string, std::string> names_;  // by their folded names
-  std::string in_;                            // the class or structure that is read
+  std::set<std::string> structures_;
+  std::map<std::string, std::vector<CppVariable>> members_;  // also of classes
+  std::map<std::string, std::string> names_;                 // by their folded names
+  std::string in_;                                           // the class or structure that is read
 };
 
 }  // namespace plchost::strucpp

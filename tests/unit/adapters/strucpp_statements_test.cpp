@@ -256,6 +256,7 @@ IEC_INT COUNTER::get_SIZE() const {
     IECStringVar<10> S = "(=";
     IECStringVar<9000> LONG;
     IEC_INT* P;
+    COUNTER BLOCK;
 #line 4 "x"
     IEC_REAL __output_tmp_0;
     for (I = 0; I <= 9; I++) {
