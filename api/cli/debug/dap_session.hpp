@@ -36,8 +36,12 @@ class DapSession {
  private:
   using Json = nlohmann::json;
   using Answer = Result<Json>;  ///< the body
-  /// A frame's number: the thread's, and the place in its stack.
+  /// A frame's number: the thread's, and the place in its stack. That of its local variables is larger.
   static constexpr std::int64_t kFramesOfThread = 1000;
+  static constexpr std::int64_t kLocals = 500;
+  [[nodiscard]] static bool is_of_locals(std::int64_t reference) noexcept {
+    return reference % kFramesOfThread >= kLocals;
+  }
 
   [[nodiscard]] Answer carry_out(const std::string& command, const Json& arguments);
   [[nodiscard]] Answer attach(const Json& arguments);
@@ -54,11 +58,17 @@ class DapSession {
   [[nodiscard]] Answer evaluate(const Json& arguments);
   [[nodiscard]] Answer go_on(const std::string& command, const Json& arguments);
   [[nodiscard]] Answer pause(const Json& arguments);
-  [[nodiscard]] Answer written(const std::string& instance, const std::string& name,
-                               const std::string& value);
+  /// The value that a name means in a frame.
+  [[nodiscard]] Answer evaluated(const Json& frame, const std::string& name, const std::string& context);
+  /// Writes what the name means in a frame.
+  [[nodiscard]] Answer written(std::int64_t frame, const std::string& name, const std::string& value);
+  [[nodiscard]] Answer written_variable(const std::string& instance, const std::string& name,
+                                        const std::string& value);
+  [[nodiscard]] Answer written_local(std::int64_t frame, const std::string& name, const std::string& value);
   [[nodiscard]] Result<std::string> task_of(const Json& arguments);
   [[nodiscard]] std::int64_t thread_of(const std::string& task) const;
-  [[nodiscard]] std::string instance_of(std::int64_t frame) const;
+  /// Also by the number of its local variables; an empty object: there is none.
+  [[nodiscard]] Json frame_at(std::int64_t number) const;
   void event(const std::string& name, Json body);
   void tell(const std::string& category, const std::string& text);
   void tell_halt(const Json& task);

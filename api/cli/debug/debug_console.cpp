@@ -57,6 +57,16 @@ void print_halt(const Json& task) {
                          stack.empty() ? std::string("?") : place_text(stack.front())));
 }
 
+void print_local(const Json& local) {
+  print_line(fmt::format("{} = {}", local.value("name", ""), local.value("value", "")));
+}
+
+void print_variable(const plc_VariableRecord& variable) {
+  const std::string_view forced = forced_text(variable);
+  print_line(fmt::format("{} = {}{}{}", dds::text_of(variable.name), dds::text_of(variable.value),
+                         forced.empty() ? "" : "  ", forced));
+}
+
 }  // namespace
 
 void DebugConsole::say(const Result<void>& done) {
@@ -215,11 +225,11 @@ Result<void> DebugConsole::choose_frame(std::string_view verb, const std::string
 }
 
 // A state that is too long to be told has fewer frames than the stack.
-Result<std::string> DebugConsole::frame_instance() const {
+Result<Json> DebugConsole::current_frame() const {
   const Json stack = current_stack();
-  if (stack.empty()) return std::string();
+  if (stack.empty()) return Json::object();
   const auto place = static_cast<std::size_t>(frame_);
-  if (place < stack.size()) return stack[place].value("instance", "");
+  if (place < stack.size()) return stack[place];
   return failure(ErrorCode::wrong_state,
                  fmt::format("frame {} of task '{}' is not told at present; ask again, or choose another one",
                              frame_, shown(task_)));
@@ -227,25 +237,35 @@ Result<std::string> DebugConsole::frame_instance() const {
 
 Result<void> DebugConsole::print(const std::string& name) {
   PLCHOST_TRY(look());
-  PLCHOST_TRY_ASSIGN(const auto instance, frame_instance());
-  std::vector<plc_VariableRecord> found;
-  if (name.empty() && instance.empty()) {
-    return failure(
-        ErrorCode::wrong_state,
-        "no task halts in a program or function block; name a variable, or go 'up' to a caller. Local "
-        "variables of functions are not seen");
+  PLCHOST_TRY_ASSIGN(const auto frame, current_frame());
+  if (name.empty()) return print_all(frame);
+  if (name.find_first_of("*?") != std::string::npos) return print_variables(name);
+  PLCHOST_TRY_ASSIGN(const auto* const local, local_in(frame, name));
+  if (local != nullptr) {
+    print_local(*local);
+    return {};
   }
-  if (name.empty() || name.find_first_of("*?") != std::string::npos) {
-    PLCHOST_TRY_ASSIGN(found, link_.variables(name.empty() ? instance + ".*" : name));
-  } else {
-    PLCHOST_TRY_ASSIGN(const auto one, link_.variable(instance, name));
-    found.push_back(one);
-  }
-  for (const auto& variable : found) {
-    const std::string_view forced = forced_text(variable);
-    print_line(fmt::format("{} = {}{}{}", dds::text_of(variable.name), dds::text_of(variable.value),
-                           forced.empty() ? "" : "  ", forced));
-  }
+  PLCHOST_TRY_ASSIGN(const auto one, link_.variable(frame.value("instance", ""), name));
+  print_variable(one);
+  return {};
+}
+
+// The local variables first.
+Result<void> DebugConsole::print_all(const Json& frame) {
+  const std::string instance = frame.value("instance", "");
+  const Json locals = frame.value("locals", Json::array());
+  for (const Json& local : locals) print_local(local);
+  const bool left_out = frame.contains("locals_left_out");
+  if (left_out) print_line("the local variables of this call are too long to be told with all others");
+  if (!instance.empty()) return print_variables(instance + ".*");
+  if (!locals.empty() || left_out) return {};
+  return failure(ErrorCode::wrong_state,
+                 "no task halts where there are variables; name one, or go 'up' to a caller");
+}
+
+Result<void> DebugConsole::print_variables(const std::string& pattern) {
+  PLCHOST_TRY_ASSIGN(const auto found, link_.variables(pattern));
+  for (const auto& variable : found) print_variable(variable);
   return {};
 }
 
@@ -258,8 +278,14 @@ Result<void> DebugConsole::set(const std::string& order) {
   while (!name.empty() && name.back() == ' ') name.pop_back();
   std::size_t begin = equal + 1;
   while (begin < order.size() && order[begin] == ' ') ++begin;
-  PLCHOST_TRY_ASSIGN(const auto instance, frame_instance());
-  PLCHOST_TRY_ASSIGN(name, link_.write(instance, name, order.substr(begin)));
+  const std::string value = order.substr(begin);
+  PLCHOST_TRY_ASSIGN(const auto frame, current_frame());
+  PLCHOST_TRY_ASSIGN(const auto* const local, local_in(frame, name));
+  if (local != nullptr) {
+    PLCHOST_TRY(link_.write_local(task_, frame_, name, value));
+  } else {
+    PLCHOST_TRY_ASSIGN(name, link_.write(frame.value("instance", ""), name, value));
+  }
   return print(name);
 }
 

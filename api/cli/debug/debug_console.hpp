@@ -42,8 +42,10 @@ class DebugConsole {
   [[nodiscard]] Result<void> wait_for_halt(const std::string& task, Duration patience);
   [[nodiscard]] Result<void> choose(const std::string& task);
   [[nodiscard]] Result<std::string> task_or_current(const std::string& named);
-  /// That is called in the chosen frame; empty: none. wrong_state: the frame is not told.
-  [[nodiscard]] Result<std::string> frame_instance() const;
+  /// The chosen one; an empty object: no task halts. wrong_state: the frame is not told.
+  [[nodiscard]] Result<nlohmann::json> current_frame() const;
+  [[nodiscard]] Result<void> print_all(const nlohmann::json& frame);
+  [[nodiscard]] Result<void> print_variables(const std::string& pattern);
   [[nodiscard]] nlohmann::json current_stack() const;
   void mean(const std::string& task);
   void take(const nlohmann::json& state);

@@ -151,4 +151,10 @@ Result<std::string> DebugLink::write(const std::string& instance, const std::str
   return whole;
 }
 
+Result<void> DebugLink::write_local(const std::string& task, std::int64_t frame, const std::string& name,
+                                    const std::string& value) {
+  PLCHOST_TRY(command(fmt::format("local {} {} {}={}", task, frame, name, value)));
+  return {};
+}
+
 }  // namespace plchost

@@ -54,6 +54,10 @@ class DebugLink {
   [[nodiscard]] Result<std::string> write(const std::string& instance, const std::string& name,
                                           const std::string& value);
 
+  /// Writes a local variable of a call of a task that halts; 0 is where it halts.
+  [[nodiscard]] Result<void> write_local(const std::string& task, std::int64_t frame, const std::string& name,
+                                         const std::string& value);
+
  private:
   /// The rest of a part, and what its head says.
   struct Part {

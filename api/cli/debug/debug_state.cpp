@@ -11,6 +11,12 @@ namespace {
 
 using Json = nlohmann::json;
 
+// As IEC 61131-3 compares names.
+bool same_name(std::string_view left, std::string_view right) {
+  const auto folded = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  return std::ranges::equal(left, right, {}, folded, folded);
+}
+
 }  // namespace
 
 const Json* task_in(const Json& state, std::string_view name) {
@@ -19,6 +25,20 @@ const Json* task_in(const Json& state, std::string_view name) {
   const auto found =
       std::ranges::find_if(tasks, [&](const Json& task) { return task.value("task", "") == name; });
   return found == tasks.end() ? nullptr : &*found;
+}
+
+Result<const Json*> local_in(const Json& frame, std::string_view name) {
+  if (frame.contains("locals_left_out")) {
+    return failure(
+        ErrorCode::full,
+        "the local variables of this call are too long to be told with all others: let other tasks go "
+        "on, or delete breakpoints");
+  }
+  const auto locals = frame.find("locals");
+  if (locals == frame.end()) return nullptr;
+  const auto found = std::ranges::find_if(
+      *locals, [&](const Json& local) { return same_name(local.value("name", ""), name); });
+  return found == locals->end() ? nullptr : &*found;
 }
 
 std::vector<DebugNews::Line> DebugNews::lines(const Json& state) {

@@ -8,10 +8,16 @@
 
 #include <nlohmann/json.hpp>
 
+#include "shm/base/result.hpp"
+
 namespace plchost {
 
 /// The task of that name in a state of a debugger; null: it has none.
 [[nodiscard]] const nlohmann::json* task_in(const nlohmann::json& state, std::string_view name);
+
+/// The local variable that a name means in a frame: its name, type and value. Null: the frame has none. full:
+/// the state was too long to tell them.
+[[nodiscard]] Result<const nlohmann::json*> local_in(const nlohmann::json& frame, std::string_view name);
 
 /// News in the states of a debugger: each halt and each line of a log point, once.
 class DebugNews {

@@ -192,12 +192,20 @@ def text(port, source):
     assert client.ask("evaluate", expression="press1.one.n")["result"] == "1001"
     client.ask("stepIn", threadId=main)
     client.event("stopped")
-    assert [one["name"].lower() for one in stack(client, main)] == ["twice", "press"]
+    frames = stack(client, main)
+    assert [one["name"].lower() for one in frames] == ["twice", "press"]
+    (scope,) = client.ask("scopes", frameId=frames[0]["id"])["scopes"]
+    locals_ = {one["name"].lower(): one["value"] for one in client.ask("variables", variablesReference=scope["variablesReference"])["variables"]}
+    assert scope["name"] == "Locals" and locals_ == {"x": "1001", "twice": "0"}, (scope, locals_)
+    changed = client.ask("setVariable", variablesReference=scope["variablesReference"], name="x", value="1002")
+    assert changed["value"] == "1002", changed
+    client.ask("setVariable", expect=False, variablesReference=scope["variablesReference"], name="x", value="40000")
+    assert client.ask("evaluate", expression="x", frameId=frames[0]["id"])["result"] == "1002"
     client.ask("stepOut", threadId=main)
     client.event("stopped")
     client.ask("next", threadId=main)
     client.event("stopped")
-    assert client.ask("evaluate", expression="press1.doubled")["result"] == "2002"
+    assert client.ask("evaluate", expression="press1.doubled")["result"] == "2004"
     client.ask("setBreakpoints", source={"path": source}, breakpoints=[])
     client.ask("disconnect")
 

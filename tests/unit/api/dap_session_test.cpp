@@ -30,7 +30,10 @@ class DapSessionTest : public testing::Test {
                            variable_record("Main.c.t[]", "ARRAY [1..2] OF INT", "[3, 4]")};
     instance_.halt("fast", 1,
                    json::array({{{"pou", "Counter"}, {"line", 9}, {"file", "a.st"}, {"instance", "Main.c"}},
-                                {{"pou", "Twice"}, {"line", 3}, {"file", "a.st"}},
+                                {{"pou", "Twice"},
+                                 {"line", 3},
+                                 {"file", "a.st"},
+                                 {"locals", json::array({{{"name", "n"}, {"type", "INT"}, {"value", "3"}}})}},
                                 {{"pou", "Main"}, {"line", 20}, {"file", "a.st"}, {"instance", "Main"}}}));
     (void)ask("attach");
   }
@@ -110,13 +113,43 @@ TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
   ASSERT_EQ(frames.size(), 3U);
   EXPECT_EQ(frames[2]["id"], kCaller);
   EXPECT_EQ(ask("scopes", {{"frameId", kInnermost}})["scopes"][0]["name"], "Main.c");
-  EXPECT_EQ(ask("scopes", {{"frameId", kInnermost + 1}})["scopes"].size(), 0U) << "a function";
   const json scope = ask("scopes", {{"frameId", kCaller}})["scopes"][0];
   EXPECT_EQ(scope["name"], "Main");
   EXPECT_THAT(shown(scope["variablesReference"]), Contains("n=1"));
   EXPECT_EQ(ask("evaluate", {{"expression", "n"}, {"frameId", kCaller}})["result"], "1");
   (void)ask("setVariable", {{"variablesReference", kCaller}, {"name", "n"}, {"value", "5"}});
   EXPECT_THAT(instance_.written, ElementsAre("Main.n=5"));
+}
+
+TEST_F(DapSessionTest, AFrameOfAFunctionHasItsLocalVariables) {
+  constexpr int kFunction = kInnermost + 1;
+  const json scopes = ask("scopes", {{"frameId", kFunction}})["scopes"];
+  ASSERT_EQ(scopes.size(), 1U);
+  EXPECT_EQ(scopes[0]["name"], "Locals");
+  const int reference = scopes[0]["variablesReference"];
+  EXPECT_THAT(shown(reference), ElementsAre("n=3"));
+  EXPECT_EQ(ask("evaluate", {{"expression", "N"}, {"frameId", kFunction}})["result"], "3");
+  EXPECT_EQ(ask("evaluate", {{"expression", "Main.n"}, {"frameId", kFunction}})["result"], "1");
+  EXPECT_EQ(ask("setVariable", {{"variablesReference", reference}, {"name", "n"}, {"value", "4"}})["value"],
+            "3");
+  (void)ask("evaluate", {{"expression", "n := 5"}, {"frameId", kFunction}, {"context", "repl"}});
+  EXPECT_THAT(instance_.commands, ElementsAre("local fast 1 n=4", "local fast 1 n=5"));
+  EXPECT_THAT(instance_.written, IsEmpty());
+  EXPECT_FALSE(
+      answer("setVariable", {{"variablesReference", 9999}, {"name", "n"}, {"value", "4"}})["success"]);
+}
+
+TEST_F(DapSessionTest, LocalVariablesThatAreNotToldMeanNoOthers) {
+  instance_.tasks[0]["stack"][0]["locals_left_out"] = true;
+  (void)ask("stackTrace", {{"threadId", 1}});
+  const json scopes = ask("scopes", {{"frameId", kInnermost}})["scopes"];
+  ASSERT_EQ(scopes.size(), 2U);
+  const auto fails = [&](const std::string& command, const json& arguments) {
+    return !answer(command, arguments)["success"].get<bool>();
+  };
+  EXPECT_TRUE(fails("variables", {{"variablesReference", scopes[0]["variablesReference"]}}));
+  EXPECT_TRUE(fails("evaluate", {{"expression", "n"}, {"frameId", kInnermost}}));
+  EXPECT_THAT(shown(scopes[1]["variablesReference"]), Contains("n=2"));
 }
 
 TEST_F(DapSessionTest, ShowsASourceByThePathThatItsClientHasForIt) {

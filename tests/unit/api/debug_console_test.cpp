@@ -21,7 +21,7 @@ class DebugConsoleTest : public testing::Test {
   DebugConsoleTest() {
     (void)link_.attach(false);
     instance_.variables = {variable_record("n", "INT", "7"), variable_record("Main.n", "INT", "1"),
-                           variable_record("Main.c.n", "INT", "2"),
+                           variable_record("Main.c.n", "INT", "2"), variable_record("x", "INT", "8"),
                            variable_record("Main.t[]", "ARRAY [1..2] OF INT", "[3, 4]")};
     instance_.halt("fast", 1, stack_);
   }
@@ -36,7 +36,12 @@ class DebugConsoleTest : public testing::Test {
 
   const json stack_ =
       json::array({{{"pou", "Counter"}, {"line", 9}, {"file", "a.st"}, {"instance", "Main.c"}},
-                   {{"pou", "Twice"}, {"line", 3}, {"file", "a.st"}},
+                   {{"pou", "Twice"},
+                    {"line", 3},
+                    {"file", "a.st"},
+                    {"locals", json::array({{{"name", "x"}, {"type", "INT"}, {"value", "3"}},
+                                            {{"name", "Twice"}, {"type", "INT"}, {"value", "0"}}})}},
+                   {{"pou", "Full"}, {"line", 4}, {"file", "a.st"}, {"locals_left_out", true}},
                    {{"pou", "Main"}, {"line", 20}, {"file", "a.st"}, {"instance", "Main"}}});
   DebuggedInstance instance_;
   DebugLink link_{instance_.requests(), "cell", "line1"};
@@ -56,16 +61,16 @@ TEST_F(DebugConsoleFrames, AreChosenByNumberAndByUpAndDown) {
   (void)said("tasks");
   EXPECT_EQ(said("frame"), "#0 Counter:9 (a.st)  Main.c\n");
   EXPECT_EQ(said("up"), "#1 Twice:3 (a.st)\n");
-  EXPECT_EQ(said("up"), "#2 Main:20 (a.st)  Main\n");
-  EXPECT_EQ(said("down 2"), "#0 Counter:9 (a.st)  Main.c\n");
-  EXPECT_EQ(said("frame 2"), "#2 Main:20 (a.st)  Main\n");
-  EXPECT_EQ(said("frame"), "#2 Main:20 (a.st)  Main\n");
+  EXPECT_EQ(said("up 2"), "#3 Main:20 (a.st)  Main\n");
+  EXPECT_EQ(said("down 3"), "#0 Counter:9 (a.st)  Main.c\n");
+  EXPECT_EQ(said("frame 3"), "#3 Main:20 (a.st)  Main\n");
+  EXPECT_EQ(said("frame"), "#3 Main:20 (a.st)  Main\n");
   EXPECT_FALSE(sut_.failed());
 }
 
 TEST_F(DebugConsoleFrames, AreThoseOfPrintAndSet) {
   EXPECT_THAT(said("print n"), HasSubstr("Main.c.n = 2\n"));
-  (void)said("frame 2");
+  (void)said("frame 3");
   EXPECT_EQ(said("print n"), "Main.n = 1\n");
   EXPECT_THAT(said("print"), HasSubstr("Main.n = 1\n"));
   (void)said("set n = 5");
@@ -74,22 +79,42 @@ TEST_F(DebugConsoleFrames, AreThoseOfPrintAndSet) {
   EXPECT_THAT(instance_.written, ElementsAre("Main.n=5", "Main.c.n=6"));
 }
 
-TEST_F(DebugConsoleFrames, OfAFunctionHaveNoInstance) {
+TEST_F(DebugConsoleFrames, OfAFunctionHaveLocalVariables) {
   (void)said("tasks");
+  EXPECT_EQ(said("print x"), "x = 8\n") << "the global";
   (void)said("up");
-  EXPECT_THAT(said("print"), HasSubstr("Local variables of functions are not seen"));
+  EXPECT_EQ(said("print"), "x = 3\nTwice = 0\n");
+  EXPECT_EQ(said("print X"), "x = 3\n");
   EXPECT_EQ(said("print n"), "n = 7\n");
+  EXPECT_EQ(said("set x = 4"), "x = 3\n") << "as it is told";
+  EXPECT_THAT(instance_.commands, ElementsAre("local fast 1 x=4"));
+  (void)said("set n=5");
+  EXPECT_THAT(instance_.written, ElementsAre("n=5"));
+}
+
+TEST_F(DebugConsoleFrames, WhoseLocalVariablesAreNotToldMeanNoOthers) {
+  (void)said("frame 2");
+  EXPECT_THAT(said("print"), HasSubstr("the local variables of this call are too long to be told"));
+  EXPECT_THAT(said("print x"), HasSubstr("the local variables of this call are too long to be told"));
+  EXPECT_THAT(said("set x=4"), HasSubstr("the local variables of this call are too long to be told"));
+  EXPECT_TRUE(instance_.commands.empty());
+  EXPECT_TRUE(instance_.written.empty());
+}
+
+TEST_F(DebugConsoleFrames, OfNoTaskHaveNoVariables) {
+  instance_.tasks = json::array();
+  EXPECT_THAT(said("print"), HasSubstr("no task halts where there are variables"));
 }
 
 TEST_F(DebugConsoleFrames, BeginAnewWithAHaltAndWithAnotherTask) {
-  (void)said("frame 2");
+  (void)said("frame 3");
   instance_.halt("fast", 2, stack_);
   EXPECT_THAT(said("frame"), HasSubstr("#0 Counter:9"));
 
-  (void)said("frame 2");
+  (void)said("frame 3");
   EXPECT_THAT(said("task fast"), Not(HasSubstr("plcctl:")));
-  EXPECT_THAT(said("frame"), HasSubstr("#2 Main:20")) << "the same task";
-  instance_.halt("slow", 1, json::array({stack_[2], stack_[2]}));
+  EXPECT_THAT(said("frame"), HasSubstr("#3 Main:20")) << "the same task";
+  instance_.halt("slow", 1, json::array({stack_[3], stack_[3]}));
   (void)said("tasks");
   (void)said("up");
   (void)said("task fast");
@@ -101,8 +126,8 @@ TEST_F(DebugConsoleFrames, BeginAnewWithAHaltAndWithAnotherTask) {
 
 TEST_F(DebugConsoleFrames, ThatThereAreNotAreRefused) {
   (void)said("tasks");
-  EXPECT_THAT(said("down"), HasSubstr("no frame -1: task 'fast' has the frames 0 to 2"));
-  EXPECT_THAT(said("frame 3"), HasSubstr("no frame 3"));
+  EXPECT_THAT(said("down"), HasSubstr("no frame -1: task 'fast' has the frames 0 to 3"));
+  EXPECT_THAT(said("frame 4"), HasSubstr("no frame 4"));
   EXPECT_THAT(said("up 4294967295"), HasSubstr("no frame 4294967295"));
   for (const char* const text : {"frame -1", "frame x", "up 1x", "down 99999999999"})
     EXPECT_THAT(said(text), HasSubstr("is no number of a frame, or of frames")) << text;
@@ -113,9 +138,9 @@ TEST_F(DebugConsoleFrames, ThatThereAreNotAreRefused) {
 
 // A state that is too long to tell has fewer frames.
 TEST_F(DebugConsoleFrames, ThatAreNotToldAnyMoreMeanNoOther) {
-  (void)said("frame 2");
+  (void)said("frame 3");
   instance_.halt("fast", 1, json::array({stack_[0]}));
-  EXPECT_THAT(said("set n = 5"), HasSubstr("frame 2 of task 'fast' is not told at present"));
+  EXPECT_THAT(said("set n = 5"), HasSubstr("frame 3 of task 'fast' is not told at present"));
   EXPECT_TRUE(instance_.written.empty());
 }
 
