@@ -25,6 +25,10 @@ constexpr Duration kEndLimit = std::chrono::seconds(2);  // of a process that wa
 
 }  // namespace
 
+std::string audit_folder(const HostConfig& host) {
+  return fmt::format("{}/audit.{}", host.state_directory, host.name);
+}
+
 ApiServer::ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program,
                      std::function<bool()> is_asked)
     : reactor_(reactor),
@@ -87,7 +91,7 @@ std::vector<std::string> ApiServer::arguments() const {
                                         "--host-number",
                                         fmt::format("{}", config_.blocks.host_number),
                                         "--audit-folder",
-                                        fmt::format("{}/audit.{}", host.state_directory, host.name),
+                                        audit_folder(host),
                                         "--applications-folder",
                                         applications_folder(host.state_directory, host.name),
                                         "--application-limit",
@@ -179,7 +183,7 @@ void ApiServer::name_is_taken(TimePoint now) {
   spdlog::error("API server: another host has the name '{}'; asks for it again after {} s", config_.host.name,
                 std::chrono::duration_cast<std::chrono::seconds>(name_delay_).count());
   notify_service_manager(
-      fmt::format("STATUS=not served over DDS: another host has the name '{}'", config_.host.name).c_str());
+      fmt::format("STATUS=not served over DDS: another host has the name '{}'", config_.host.name));
   timer_.set(now + name_delay_);
 }
 

@@ -13,6 +13,9 @@
 
 namespace plchost {
 
+/// Of the server's log of changes.
+[[nodiscard]] std::string audit_folder(const HostConfig& host);
+
 /// Keeps `plchost-dds` running: started again at once when it ends, and with back-off when it keeps ending;
 /// killed when its loop stands still. It finds the manager by its control socket, and ends by itself when
 /// that closes. When another host of the domain has this host's name, it is started again from time to time

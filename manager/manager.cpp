@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "api/control/application_versions.hpp"
 #include "api/control/control_handler.hpp"
 #include "instances/launch/core_latency.hpp"
 #include "manager/host_check/host_check.hpp"
@@ -38,6 +39,7 @@ namespace {
 // How often instances are asked what they say of themselves, by reading their pages.
 constexpr Duration kTick = std::chrono::milliseconds(50);
 constexpr unsigned kTicksPerTidying = 20;  // of the pool
+constexpr Duration kStateLimit = std::chrono::seconds(2);
 
 static_assert(kMinPoolObjects == kMinObjects && kMaxPoolObjects == kMaxObjects,
               "[host] pool_objects allows what a pool allows");
@@ -130,10 +132,36 @@ Result<void> Manager::lock_wishes() {
   return {};
 }
 
+// Applications in them are run, and wishes followed. A disk that hangs is no reason to stop a plant here,
+// either.
+Result<void> Manager::check_state_folders() {
+  const HostConfig& host = config_.host;
+  const std::vector<std::string> folders{host.state_directory, wishes_folder(host.state_directory, host.name),
+                                         applications_folder(host.state_directory, host.name),
+                                         audit_folder(host)};
+  const auto check = [folders]() -> Result<void> {
+    for (const std::string& folder : folders) {
+      auto ours = check_own_folder(folder);
+      if (!ours && ours.error().code == ErrorCode::refused) return ours;
+    }
+    return {};
+  };
+  constexpr const char* kWhere = "[host] state_directory";
+  const auto checked = state_disk_.ask<Result<void>>(kStateLimit, kWhere, check);
+  if (!checked) {
+    spdlog::error("the manager cannot see who may write there: {}", checked.error().describe());
+  } else if (!*checked) {
+    return failure_in(kWhere, checked->error());
+  }
+  return {};
+}
+
 Result<void> Manager::set_up() {
   const HostConfig& host = config_.host;
   if (auto free = check_pool_is_free(host.pool); !free) return free;
+  PLCHOST_TRY(check_state_folders());
   if (auto alone = lock_wishes(); !alone) return alone;
+  PLCHOST_TRY(check_state_folders());  // one that somebody else has made meanwhile
   // Children inherit this: instances then bind themselves to their own cores.
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
     spdlog::warn("cannot bind the manager to housekeeping_cores: {}", bound.error().describe());
@@ -264,6 +292,7 @@ Result<void> Manager::run() {
 }
 
 void Manager::tick() {
+  notify_of_the_rest();
   service_watchdog_.feed(MonotonicClock::now());
   supervisor_->refresh();
   if (latency_due_) restore_latency();

@@ -54,6 +54,7 @@ class Manager : private InstanceObserver {
   Manager(const ManagerConfig& config, Options options, LockFile lock, std::unique_ptr<Reactor> reactor);
   [[nodiscard]] Result<void> set_up();
   [[nodiscard]] Result<void> lock_wishes();
+  [[nodiscard]] Result<void> check_state_folders();
   void make_supervisor();
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
   void adopt_removed();

@@ -76,7 +76,7 @@ void remove_downloads(std::string_view pool) noexcept {
   std::error_code error;
   for (std::filesystem::directory_iterator at(kFolder, error), end; !error && at != end;
        at.increment(error)) {
-    if (at->path().filename().string().starts_with(begin)) ::unlink(at->path().c_str());
+    if (at->path().filename().string().starts_with(begin)) ::remove(at->path().c_str());
   }
 }
 

@@ -100,16 +100,35 @@ void CommandServer::take_packet(std::uint64_t id, std::string_view packet) {
                                    .text = fmt::format("{} requests of this peer are not answered yet",
                                                        kMaxPendingRequests)});
   }
+  const KnownRequests::Asker asker{.connection = id, .number = request->number};
+  if (const auto earlier = known_.find(*request, asker)) {
+    ++connection.pending;
+    if (earlier->answer) answer({asker}, *earlier->answer);
+    return;
+  }
   if (const auto in_time = check_in_time(request->limit_ns); !in_time) {
     return answer(
         id, ControlReply{
                 .number = request->number, .code = in_time.error().code, .text = in_time.error().message});
   }
+  begin(connection, *request, asker);
+}
+
+void CommandServer::begin(Connection& connection, const ControlRequest& request, KnownRequests::Asker asker) {
   ++connection.pending;
-  handler_.handle(*request, [this, id](const ControlReply& reply) {
-    if (Connection* asker = find(id)) --asker->pending;
-    answer(id, reply);
+  known_.begin(request, asker, MonotonicClock::now());
+  handler_.handle(request, [this, asker, key = request.id](const ControlReply& reply) {
+    answer(known_.end(key, asker, reply, MonotonicClock::now()), reply);
   });
+}
+
+// Each by its own number.
+void CommandServer::answer(const std::vector<KnownRequests::Asker>& askers, ControlReply reply) {
+  for (const auto& [id, number] : askers) {
+    if (Connection* connection = find(id)) --connection->pending;
+    reply.number = number;
+    answer(id, reply);
+  }
 }
 
 void CommandServer::answer(std::uint64_t id, const ControlReply& reply) {

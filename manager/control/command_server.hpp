@@ -6,8 +6,10 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "api/control/control_handler.hpp"
+#include "manager/control/known_requests.hpp"
 #include "manager/system/reactor.hpp"
 #include "shm/sockets/packet_socket.hpp"
 
@@ -44,7 +46,9 @@ class CommandServer {
   void accept();
   void on_ready(std::uint64_t id, std::uint32_t epoll_events);
   void take_packet(std::uint64_t id, std::string_view packet);
+  void begin(Connection& connection, const ControlRequest& request, KnownRequests::Asker asker);
   void answer(std::uint64_t id, const ControlReply& reply);
+  void answer(const std::vector<KnownRequests::Asker>& askers, ControlReply reply);
   [[nodiscard]] bool flush(Connection& connection);
   void close(std::uint64_t id, std::string_view why);
   [[nodiscard]] Connection* find(std::uint64_t id);
@@ -56,6 +60,7 @@ class CommandServer {
   Reactor::Timer accept_again_;
   std::map<std::uint64_t, Connection> connections_;
   std::uint64_t next_id_ = 1;
+  KnownRequests known_;
 };
 
 }  // namespace plchost

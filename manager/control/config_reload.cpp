@@ -131,8 +131,7 @@ void ConfigReload::finish(const Result<std::string>& result) {
     notify_service_manager(
         fmt::format("READY=1\nSTATUS={}", result ? "the configuration is the file's"
                                                  : "the changed configuration is refused: see "
-                                                   "the log")
-            .c_str());
+                                                   "the log"));
   }
 }
 

@@ -123,6 +123,8 @@ void ManagedInstance::set_boot(const std::string& text) {
 
 // An application that was loaded long ago must not win without a word.
 void ManagedInstance::tell_boot_application() const {
+  if (application_ == begun_with_.application)
+    return;  // nobody has loaded it: the configuration has changed since
   const auto version = own_.applications.version_at(application_);
   const std::string what =
       version ? fmt::format("version {} ({}, {})", version->number, version->name,

@@ -198,7 +198,12 @@ void ManagedInstance::fall_silent(std::string_view known) {
   if (operation_->step == Step::until_up) return carry_out(operation_->request.verb);
   if (operation_->step != Step::forwarded) return;
   host_.set_timer(std::nullopt);
-  finish(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it", status_.problem.view()));
+  const bool is_stop = operation_->request.verb == ControlVerb::stop;
+  finish(
+      ErrorCode::timed_out,
+      fmt::format(
+          "it is in exception now: {}; reset it{}", status_.problem.view(),
+          is_stop ? ". If it runs on, its next process is stopped all the same: start takes that back" : ""));
 }
 
 // It was kept from answering, and has missed nothing: its report holds again.

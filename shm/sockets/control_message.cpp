@@ -60,6 +60,18 @@ Result<std::map<std::string, std::string>> options_of(const Json& json) {
   return options;
 }
 
+// None: a peer that repeats nothing.
+Result<std::string> id_of(const Json& json) {
+  const auto found = json.find("id");
+  if (found == json.end()) return std::string();
+  constexpr std::size_t kMost = 100;
+  if (!found->is_string() || found->get_ref<const std::string&>().size() > kMost) {
+    return failure(ErrorCode::corrupt,
+                   fmt::format("control message has an 'id' that is no text of {} bytes at most", kMost));
+  }
+  return found->get<std::string>();
+}
+
 // None: it may be begun at any time.
 Result<std::int64_t> limit_of(const Json& json) {
   const auto found = json.find("limit_ns");
@@ -87,6 +99,7 @@ std::string encode(const ControlRequest& request) {
             {"argument", request.argument}};
   if (!request.options.empty()) json["options"] = request.options;
   if (request.limit_ns != 0) json["limit_ns"] = request.limit_ns;
+  if (!request.id.empty()) json["id"] = request.id;
   return dump(json);
 }
 
@@ -107,10 +120,16 @@ Result<ControlRequest> decode_request(std::string_view packet) {
   }
   PLCHOST_TRY_ASSIGN(auto options, options_of(json));
   PLCHOST_TRY_ASSIGN(const auto limit, limit_of(json));
+  PLCHOST_TRY_ASSIGN(auto id, id_of(json));
   const auto known = std::ranges::find(operations(), *verb, &Operation::name);
   if (known != operations().end()) {
-    return ControlRequest{
-        json["number"].get<std::uint64_t>(), known->verb, *instance, *argument, std::move(options), limit};
+    return ControlRequest{json["number"].get<std::uint64_t>(),
+                          known->verb,
+                          *instance,
+                          *argument,
+                          std::move(options),
+                          limit,
+                          std::move(id)};
   }
   return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
 }

@@ -28,6 +28,8 @@ struct ControlRequest {
   /// Until when it may be begun: boot_time_ns(), 0: at any time. Each process that takes it from a socket
   /// looks at this first, so that requests that waited there while that process was stopped are not done.
   std::int64_t limit_ns = 0;
+  /// Of a client's request and of all its repetitions, which it is done for once; empty: it is not repeated.
+  std::string id = {};
 };
 
 /// timed_out: that limit of a request is over, so it must not be begun.

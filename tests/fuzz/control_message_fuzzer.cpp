@@ -12,7 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto request = decode_request(packet)) {
     const auto again = decode_request(encode(*request));
     if (!again || again->number != request->number || again->verb != request->verb ||
-        again->instance != request->instance || again->argument != request->argument) {
+        again->instance != request->instance || again->argument != request->argument ||
+        again->id != request->id) {
       std::abort();
     }
   } else if (request.error().code != ErrorCode::corrupt) {

@@ -50,6 +50,20 @@ Result<void> DownloadTable::check_room(const std::string& instance, std::uint64_
                                               all, 2 * limit_));
 }
 
+// Any user can put files there: their names are passed over.
+Result<void> DownloadTable::make_file(Download& download) {
+  constexpr mode_t kOwnerOnly = 0600;
+  constexpr int kMostNames = 100'000;
+  for (int i = 0; i < kMostNames; ++i) {
+    download.path = download_file_name(pool_, ++last_file_);
+    download.file.reset(
+        ::open(download.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kOwnerOnly));
+    if (download.file) return {};
+    if (errno != EEXIST) break;
+  }
+  return failure(ErrorCode::system, "cannot create " + download.path, errno);
+}
+
 Result<void> DownloadTable::begin(const dds::Guid& client, const plc_SampleIdentity& identity,
                                   ControlRequest request, TimePoint now) {
   PLCHOST_TRY_ASSIGN(const auto order, ApplicationOrder::from_options(request.options));
@@ -59,13 +73,10 @@ Result<void> DownloadTable::begin(const dds::Guid& client, const plc_SampleIdent
                     .request = std::move(request),
                     .size = order.size,
                     .received = 0,
-                    .path = download_file_name(pool_, ++last_file_),
+                    .path = {},
                     .file = {},
                     .last = now};
-  constexpr mode_t kOwnerOnly = 0600;
-  const char* const path = download.path.c_str();
-  download.file.reset(::open(path, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kOwnerOnly));
-  if (!download.file) return failure(ErrorCode::system, "cannot create " + download.path, errno);
+  PLCHOST_TRY(make_file(download));
   download.request.options[std::string(kSourceOption)] = fmt::format("{}", last_file_);
   downloads_.push_back(std::move(download));
   return {};

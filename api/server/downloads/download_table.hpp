@@ -93,6 +93,7 @@ class DownloadTable {
   };
   [[nodiscard]] std::list<Download>::iterator find(const plc_SampleIdentity& identity);
   [[nodiscard]] Result<void> check_room(const std::string& instance, std::uint64_t size) const;
+  [[nodiscard]] Result<void> make_file(Download& download);
   static void write(Download& download, const plc_DownloadChunk& chunk);
   void remove(std::list<Download>::iterator download);
 

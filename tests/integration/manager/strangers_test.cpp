@@ -112,6 +112,25 @@ TEST_F(StrangersFiles, ARunDirectoryThatOthersCanWriteIsRefused) {
   EXPECT_THAT(plant.start_refused_manager(), HasSubstr("owner 65534"));
 }
 
+// Applications in it are run by the manager's user.
+TEST_F(StrangersFiles, AStateDirectoryThatOthersCanWriteIsRefused) {
+  plant.start_manager();
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  const fs::path state = plant.state_directory();
+  ::chmod(state.c_str(), 0777);
+  EXPECT_THAT(plant.start_refused_manager(),
+              AllOf(HasSubstr("[host] state_directory"), HasSubstr("other users can put files into it")));
+  ::chmod(state.c_str(), 0755);
+  for (const fs::path& folder : {state, state / "applications.cell", state / "wishes.cell"}) {
+    fs::create_directories(folder);
+    ASSERT_EQ(::chown(folder.c_str(), kStranger, kStranger), 0);
+    EXPECT_THAT(plant.start_refused_manager(), HasSubstr(folder.string() + " (owner 65534, "));
+    ASSERT_EQ(::chown(folder.c_str(), 0, 0), 0);
+  }
+  plant.start_manager();
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+}
+
 // The name that an instance was once claimed by, which anybody on the host can take.
 TEST_F(StrangersFiles, NorAnAbstractSocketOfTheInstancesNameKeepItFromRunning) {
   plant.add("line1", "bottling_line");

@@ -132,6 +132,7 @@ TEST_P(Wishes, AreOlderThanAChangedConfiguration) {
   plant_.start_manager();
   stays(InstanceState::stopped);
   EXPECT_EQ(plant_.status("line1").application.view(), Plant::application("drive_axis"));
+  EXPECT_THAT(plant_.log(), testing::Not(testing::HasSubstr("was loaded last"))) << "nobody has loaded any";
 }
 
 TEST_P(Wishes, DoNotEndWithTheManagerInOrder) {

@@ -73,6 +73,16 @@ class Downloads : public testing::Test {
   TimePoint now_{std::chrono::seconds(100)};
 };
 
+TEST_F(Downloads, PassOverNamesThatOthersHaveTaken) {
+  std::filesystem::create_directory(download_file_name(pool_, 1));
+  std::ofstream(download_file_name(pool_, 2)) << "planted";
+  const auto begun = begin(1, "line1", 10);
+  EXPECT_TRUE(begun) << begun.error().describe();
+  EXPECT_THAT(files(), testing::Contains(download_file_name(pool_, 3)));
+  remove_downloads(pool_);
+  EXPECT_THAT(files(), IsEmpty()) << "the folder, too";
+}
+
 TEST_F(Downloads, AreCompleteWhenAllPiecesHaveComeInTheirOrder) {
   ASSERT_TRUE(begin(1, "line1", 5));
   EXPECT_EQ(received(), 0U);

@@ -113,6 +113,39 @@ TEST_F(CommandServerTest, DoesNotHandleWhatCameAfterItsTimeLimit) {
   EXPECT_TRUE(handler_.asked.empty());
 }
 
+// A client whose server has ended repeats its request by way of the next one.
+TEST_F(CommandServerTest, DoesARepeatedRequestOnceAndAnswersAllThatAsk) {
+  const auto repeated = [](std::uint64_t number, const std::string& id) {
+    return encode(ControlRequest{
+        .number = number, .verb = ControlVerb::restart, .instance = "a", .argument = "", .id = id});
+  };
+  auto first = std::make_unique<PacketSocket>(connect());
+  ASSERT_TRUE(first->send(repeated(7, "client.1")));
+  serve();
+  first.reset();
+  auto next = connect();
+  ASSERT_TRUE(next.send(repeated(1, "client.1")));
+  ASSERT_TRUE(next.send(repeated(2, "client.2")));
+  serve();
+  ASSERT_EQ(handler_.asked.size(), 2U);
+  EXPECT_TRUE(sut_->waits_for_answers());
+  handler_.replies[0]({.number = 7, .code = ErrorCode::timed_out, .text = "said"});
+  const ControlReply told = reply_on(next);
+  EXPECT_EQ(told.number, 1U);
+  EXPECT_EQ(told.code, ErrorCode::timed_out);
+  EXPECT_EQ(told.text, "said");
+  auto last = connect();
+  ASSERT_TRUE(last.send(repeated(4, "client.1")));
+  serve();
+  EXPECT_EQ(handler_.asked.size(), 2U);
+  const ControlReply again = reply_on(last);
+  EXPECT_EQ(again.number, 4U);
+  EXPECT_EQ(again.text, "said");
+  handler_.replies[1]({.number = 2, .code = ErrorCode::ok, .text = ""});
+  EXPECT_EQ(reply_on(next).number, 2U);
+  EXPECT_FALSE(sut_->waits_for_answers());
+}
+
 TEST_F(CommandServerTest, DropsTheReplyOfAPeerThatHasGone) {
   {
     auto client = connect();

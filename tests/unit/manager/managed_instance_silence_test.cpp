@@ -418,7 +418,7 @@ TEST_F(SilentProcess, BreaksOffWhatItWasToAnswer) {
   EXPECT_EQ(state(), InstanceState::exception);
   const auto reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::timed_out);
-  EXPECT_THAT(reply.text, HasSubstr("reset it"));
+  EXPECT_THAT(reply.text, HasSubstr("reset it. If it runs on, its next process is stopped all the same"));
   EXPECT_FALSE(host_.timer);
 }
 
