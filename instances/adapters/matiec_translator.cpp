@@ -10,6 +10,7 @@
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/located.hpp"
+#include "instances/adapters/matiec/loops.hpp"
 #include "instances/adapters/matiec/refused.hpp"
 #include "instances/adapters/matiec/statements.hpp"
 #include "instances/adapters/translator.hpp"
@@ -144,14 +145,14 @@ class MatiecTranslator : public Translator {
   bool drop_directives() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return false;
-    code_ = matiec::without_directives(*code);
+    code_ = matiec::without_directives(matiec::with_first_turns(*code));
     return context_.has(context_.folder().replace(kCode, code_));
   }
 
   bool instrument() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return false;
-    auto made = matiec::with_statements(*code, *joined_, context_.project);
+    auto made = matiec::with_statements(matiec::with_first_turns(*code), *joined_, context_.project);
     for (iec::DebugPou& pou : made.pous) {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }

@@ -114,6 +114,29 @@ CONFIGURATION cell
 END_CONFIGURATION
 )";
 
+constexpr const char* kLoops = R"(
+PROGRAM Main
+  VAR one : DINT := 1; i : DINT; END_VAR
+  VAR equal AT %QD0 : DINT; wide AT %QD1 : DINT; down AT %QD2 : DINT; none AT %QD3 : DINT; cycles AT %QD4 : DINT; END_VAR
+  equal := 0; wide := 0; down := 0; none := 0;
+  FOR i := 1 TO one DO equal := equal + 1; END_FOR;
+  FOR i := 0 TO one BY 3 DO wide := wide + 1; END_FOR;
+  FOR i := 5 TO one BY -2 DO down := down + 1; END_FOR;
+  FOR i := 2 TO one DO none := none + 1; END_FOR;
+  cycles := cycles + 1;
+END_PROGRAM
+CONFIGURATION cell
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM one WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+struct Turns {
+  std::int32_t equal = 0, wide = 0, down = 0, none = 0, cycles = 0;
+};
+
 struct Counted {
   std::int32_t total = 0, fresh = 0;
   std::int16_t of_shift = 0;
@@ -163,6 +186,18 @@ TEST_P(TranslatedText, RunsAsItIsWritten) {
   EXPECT_THAT(built.output, HasSubstr("PROGRAM rest has no TASK: it runs freewheeling"));
   start(sandbox.folder() + "/twice.so");
   expect_it_works();
+}
+
+TEST_P(TranslatedText, LoopsAsOftenAsItsBoundsSay) {
+  const ProgramEnd built = build(kLoops, "loops");
+  ASSERT_TRUE(built.success()) << built.output;
+  start(so("loops"));
+  ASSERT_TRUE(eventually([&] { return outputs<Turns>().cycles > 5; }));
+  const auto turns = outputs<Turns>();
+  EXPECT_EQ(turns.equal, 1);
+  EXPECT_EQ(turns.wide, 1);
+  EXPECT_EQ(turns.down, 3);
+  EXPECT_EQ(turns.none, 0);
 }
 
 TEST_P(TranslatedText, ThatRetainsVariablesHasThemAfterARestart) {
