@@ -4,7 +4,7 @@
 #   tests/bench/run.sh [--quick] [--stress] [--json FILE] [--markdown FILE] [--plots DIR]
 #                      [--only PART,...] [--seconds N] [--rounds N]
 # 60 s of each thing in three rounds: an hour and a half idle, and half as much again with --stress, which measures again
-# beside stress-ng. --quick: 1.2 s of each, in less than four minutes after the build. --help: this text, and once it is built the
+# beside stress-ng. --quick: 0.8 s of each in two rounds, in less than four minutes after the build. --help: this text, and once it is built, the
 # parts that there are.
 # A noisy machine shows in the floor and in the spread of the rounds: read the ratios.
 set -euo pipefail
