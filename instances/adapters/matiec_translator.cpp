@@ -142,17 +142,23 @@ class MatiecTranslator : public Translator {
         fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
   }
 
-  bool drop_directives() {
+  // Of the program, as iec2c should have written it.
+  [[nodiscard]] std::optional<std::string> read_code() {
     const auto code = context_.folder().read(kCode);
-    if (!context_.has(code)) return false;
-    code_ = matiec::without_directives(matiec::with_first_turns(*code));
+    return context_.has(code) ? std::optional(matiec::with_first_turns(*code)) : std::nullopt;
+  }
+
+  bool drop_directives() {
+    const auto code = read_code();
+    if (!code) return false;
+    code_ = matiec::without_directives(*code);
     return context_.has(context_.folder().replace(kCode, code_));
   }
 
   bool instrument() {
-    const auto code = context_.folder().read(kCode);
-    if (!context_.has(code)) return false;
-    auto made = matiec::with_statements(matiec::with_first_turns(*code), *joined_, context_.project);
+    const auto code = read_code();
+    if (!code) return false;
+    auto made = matiec::with_statements(*code, *joined_, context_.project);
     for (iec::DebugPou& pou : made.pous) {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }

@@ -197,10 +197,7 @@ TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
   ASSERT_EQ(run({"list", "instances"}).code, 0);
   EXPECT_LT(MonotonicClock::now() - begin, kPatience);
   std::filesystem::remove(flag);
-  for (const TimePoint end = soon(); records("stop").size() < before + 3 && MonotonicClock::now() < end;) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  EXPECT_EQ(records("stop").size(), before + 3) << "waiting records are written then";
+  EXPECT_EQ(recorded("stop", before + 3).size(), before + 3) << "waiting records are written then";
 }
 
 // The next one would be asked to do it again.

@@ -103,19 +103,19 @@ class AreasOf : public ::testing::Test {
     };
     const std::size_t before = reports();
     (void)instance.event("report").post();
-    std::string log;
+    std::string line;
     EXPECT_TRUE(eventually([&] {
-      log = instance.log();
-      return reports() > before && log.find('\n', log.rfind("torn ")) != std::string::npos;
-    })) << log;
+      line = reports() > before ? instance.last_line_from("torn ") : "";
+      return !line.empty();
+    })) << instance.log();
     Report said;
     const int values = std::sscanf(
-        log.c_str() + log.rfind("torn "),
+        line.c_str(),
         "torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu "
         "prepared %lu with %lu",
         &said.torn, &said.input, &said.missed, &said.late, &said.begun, &said.persistent, &said.data,
         &said.origin, &said.saves, &said.prepared, &said.at_start);
-    EXPECT_EQ(values, 11) << log;
+    EXPECT_EQ(values, 11) << line;
     return said;
   }
   void power_cut() {

@@ -127,6 +127,13 @@ std::string InstanceProcess::log() const {
   return text.str();
 }
 
+std::string InstanceProcess::last_line_from(std::string_view begin) const {
+  const std::string all = log();
+  const std::size_t at = all.rfind(begin);
+  const std::size_t end = at == std::string::npos ? at : all.find('\n', at);
+  return end == std::string::npos ? "" : all.substr(at, end - at);
+}
+
 std::optional<TaskSnapshot> InstanceProcess::task(const std::string& name) const {
   constexpr Duration kWriteTakes = std::chrono::seconds(2);  // if its task loses the processor meanwhile
   std::optional<TaskSnapshot> found;

@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <sys/types.h>
@@ -54,6 +55,8 @@ class InstanceProcess {
   int end(int signal = 0);
   /// Its output so far.
   [[nodiscard]] std::string log() const;
+  /// Of the log, from the last `begin` to the end of its line; empty: that line is not there, or not whole.
+  [[nodiscard]] std::string last_line_from(std::string_view begin) const;
   /// Nothing: it has no such task.
   [[nodiscard]] std::optional<TaskSnapshot> task(const std::string& name) const;
   /// Its report in its page.
