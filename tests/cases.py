@@ -20,6 +20,7 @@ import ctypes
 import fnmatch
 import functools
 import os
+import pathlib
 import re
 import selectors
 import signal
@@ -33,6 +34,8 @@ from expected import Expected
 EVENT = re.compile(rb"\[( RUN      |       OK |  FAILED  |  SKIPPED )\] ([\w./]+)")
 RESULTS = {b"       OK ": "passed", b"  FAILED  ": "failed", b"  SKIPPED ": "skipped"}
 PR_SET_PDEATHSIG = 1
+# tests/run.sh leaves this out of processes that run one case. One that runs many of them pays for it once.
+ENVIRONMENT = {**os.environ, "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":detect_stack_use_after_return=1"}
 
 
 def list_cases(program):
@@ -56,6 +59,20 @@ def follow(parent):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+def members(group):
+    """Name and number of the processes of a group that run."""
+    found = []
+    for file in pathlib.Path("/proc").glob("[0-9]*/stat"):
+        try:
+            number, name, rest = re.fullmatch(r"(\d+) \((.*)\) (.*)\n", file.read_text(errors="replace"), re.DOTALL).groups()
+        except OSError:
+            continue  # it has ended
+        state, _, its_group = rest.split()[:3]
+        if int(its_group) == group and state not in "ZX":
+            found.append(f"{name} ({number})")
+    return found
+
+
 class Run:
     """One process, and what it has said about its cases."""
 
@@ -69,7 +86,7 @@ class Run:
             flags.write("--gtest_filter=" + ":".join(cases) + "\n")
             flags.flush()
             self.process = subprocess.Popen(
-                [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"],
+                [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"], env=ENVIRONMENT,
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=functools.partial(follow, os.getpid()))
             try:
                 self.watch()
@@ -133,10 +150,15 @@ class Run:
         """Ends the process and its children. Of one that has ended, none should be left."""
         children_of = self.process.pid
         ended_alone = self.process.poll() is not None
+        left = members(children_of) if ended_alone else []
+        patience = time.monotonic() + 5
+        while left and time.monotonic() < patience:  # a sanitizer's symbolizer ends when its pipe does
+            time.sleep(0.05)
+            left = members(children_of)
         try:
             os.killpg(children_of, signal.SIGKILL)
-            if ended_alone and not self.trouble:
-                self.trouble = "left processes running"
+            if left and not self.trouble:
+                self.trouble = f"left processes running: {', '.join(left)}"
         except ProcessLookupError:
             pass
         self.process.wait()

@@ -32,8 +32,10 @@ steps=12
 # plc_app_abi, also where one is loaded for all others to see. One test forks beside threads of others, and starts one.
 # The thread sanitizer sees nothing of the locks in Debian's Cyclone, so it judges only what is compiled for it.
 # Files and lines are told by binutils, which g++ needs anyway: clang's own symbolizer would be a large package more.
+# A second stack for each thread, and long traces of each allocation, take a third of a process that lives for a moment. So only
+# shares of cases look for uses of a stack that was left (cases.py).
 symbols=external_symbolizer_path=/usr/bin/addr2line
-export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0:$symbols UBSAN_OPTIONS=print_stacktrace=1:$symbols
+export ASAN_OPTIONS=detect_stack_use_after_return=0:malloc_context_size=8:handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0:$symbols UBSAN_OPTIONS=print_stacktrace=1:$symbols
 export TSAN_OPTIONS=handle_segv=0:handle_sigbus=0:die_after_fork=0:ignore_noninstrumented_modules=1:$symbols LSAN_OPTIONS=print_suppressions=0
 if [ "${1:-}" != --step ] && [ "${1:-}" != --fuzz ]; then
   [ -n "${PLCHOST_OWN_ROOT:-}" ] || PLCHOST_OWN_ROOT=1 exec tests/own_root.sh "$BASH" "$self" "$@"
@@ -107,6 +109,7 @@ join() {
   end_step "$2" "$code" "$seconds" "$processors" "$own/$1.log"
 }
 
+executables=  # flags for linking them
 configure() { # configure DIR OPTIONS...
   local dir=$1
   shift
@@ -114,22 +117,25 @@ configure() { # configure DIR OPTIONS...
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   # lld links in a fifth of the time of binutils, by which the demo is linked, as users do.
   cmake -S . -B "$dir" -G Ninja -DCMAKE_COMPILE_WARNING_AS_ERROR=ON "${launcher[@]}" \
-    -DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_SHARED_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_MODULE_LINKER_FLAGS=-fuse-ld=lld "$@"
+    -DCMAKE_EXE_LINKER_FLAGS="-fuse-ld=lld $executables" -DCMAKE_SHARED_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_MODULE_LINKER_FLAGS=-fuse-ld=lld "$@"
 }
-# Several files at a time, as most of the work is the headers of others.
+# Several files at a time, as most of the work is the headers of others. Where one is compiled again after an edit these are a few,
+# elsewhere all of a library.
 unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
+whole_unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=0)
 # Parts that a user may do without are required: with one of them its proof would go, and nobody would see it.
 # Collecting garbage takes a tenth of the time of g++, so it does that less often.
 build_plain() {
   configure "$build" -DPLCHOST_TESTS=ON -DPLCHOST_PYTHON=ON -DPLCHOST_OTHER_VENDOR=ON -DPLCHOST_MANUALS=ON -DPLCHOST_MODBUS=ON "${unity[@]}" \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O2 -g1 -DNDEBUG --param ggc-min-heapsize=1000000" && cmake --build "$build" -j "$jobs"
 }
-# By clang, which takes half of g++'s time for it; so a second compiler has seen everything.
+# By clang, which takes half of g++'s time for it; so a second compiler has seen everything. Not position independent: a sanitizer
+# adds so many addresses to a program that relocating them is half of its start.
 build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
-  local dir=$1 sanitizers=$2 target=$3
+  local dir=$1 sanitizers=$2 target=$3 executables=-no-pie
   shift 3
   configure "$dir" -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DSANITIZER="$sanitizers" -DPLCHOST_TESTS=ON \
-    -DPLCHOST_MODBUS=ON -DPLCHOST_BENCH=OFF "${unity[@]}" \
+    -DPLCHOST_MODBUS=ON -DPLCHOST_BENCH=OFF "${whole_unity[@]}" \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
@@ -168,11 +174,11 @@ tidy() {
     cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
-# One fuzzer starts a program that the plain build has made.
+# One fuzzer starts a program that the plain build has made. Optimized, they would take twice as long to compile as they run.
 build_fuzzers() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
-    -DPLCHOST_MODBUS=ON -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_GATED_CYCLONE="$PWD/$build/bin/gated_cyclone" "${unity[@]}" \
-    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1 -DNDEBUG" -DCMAKE_C_FLAGS_DEBUG="-O1 -g1 -DNDEBUG" &&
+    -DPLCHOST_MODBUS=ON -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_GATED_CYCLONE="$PWD/$build/bin/gated_cyclone" "${whole_unity[@]}" \
+    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1 -DNDEBUG" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1 -DNDEBUG" &&
     cmake --build .build/fuzz -j "$jobs" --target fuzzers
 }
 fuzz() {

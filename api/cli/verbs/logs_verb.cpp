@@ -36,7 +36,7 @@ struct Since {
 };
 
 std::optional<Since> parse_age(std::string_view text) {
-  constexpr std::int64_t kSecond = 1'000'000'000;
+  constexpr std::int64_t kNsOfASecond = 1'000'000'000;
   constexpr std::int64_t kMostSeconds = 1'000'000'000;
   std::int64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -49,7 +49,7 @@ std::optional<Since> parse_age(std::string_view text) {
   if (error != std::errc{} || seconds == 0 || number <= 0 || number > kMostSeconds / seconds) {
     return std::nullopt;
   }
-  return Since{.before_ns = number * seconds * kSecond, .unix_ns = 0};
+  return Since{.before_ns = number * seconds * kNsOfASecond, .unix_ns = 0};
 }
 
 Result<Since> parse_since(const std::string& text) {

@@ -96,10 +96,10 @@ int wait(CliSession& session, const WaitArguments& arguments) {
 
 void add_wait_verb(const Command& plcctl, CliSession& session) {
   const auto arguments = std::make_shared<WaitArguments>();
-  constexpr std::uint32_t kStates = 64;
+  constexpr std::uint32_t kMostStates = 64;
   std::vector<std::string> states;
   // A number stands for a state that this program does not know.
-  for (std::uint32_t state = 0; state < kStates; ++state) {
+  for (std::uint32_t state = 0; state < kMostStates; ++state) {
     if (std::string name = dds::instance_state_name(state); name != fmt::format("{}", state))
       states.push_back(std::move(name));
   }

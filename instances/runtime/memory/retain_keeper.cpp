@@ -205,7 +205,7 @@ void RetainKeeper::finish() {
 
 // Between two saves it looks whether there will be something to save.
 void RetainKeeper::run() {
-  constexpr Duration kLook = std::chrono::seconds(1);
+  constexpr Duration kBetweenLooks = std::chrono::seconds(1);
   const auto awaited = [this] { return soon_ || ending_; };
   std::unique_lock lock(mutex_);
   wake_.wait(lock, [this] { return started_ || ending_; });
@@ -213,7 +213,7 @@ void RetainKeeper::run() {
     const TimePoint next = MonotonicClock::now() + interval_;
     for (Duration left = interval_; left > Duration::zero() && !awaited();
          left = next - MonotonicClock::now()) {
-      wake_.wait_for(lock, std::min(left, kLook), awaited);
+      wake_.wait_for(lock, std::min(left, kBetweenLooks), awaited);
       lock.unlock();
       (void)notice_loss();
       lock.lock();

@@ -43,7 +43,7 @@ bool is_base_name(std::string_view text) {
 }
 
 /// "line1, line2"
-std::vector<std::string> words_of(std::string_view text) {
+std::vector<std::string> names_in(std::string_view text) {
   std::vector<std::string> words;
   while (!text.empty()) {
     const std::size_t comma = std::min(text.find(','), text.size());
@@ -54,7 +54,7 @@ std::vector<std::string> words_of(std::string_view text) {
 }
 
 bool are_node_names(std::string_view text) {
-  return std::ranges::all_of(words_of(text), [](const std::string& word) {
+  return std::ranges::all_of(names_in(text), [](const std::string& word) {
     return check_name("node", word, kMaxInstanceName).has_value();
   });
 }
@@ -90,7 +90,7 @@ constexpr std::array kBlockKeys = {
         .meaning = "instances that it exchanges blocks with directly",
         .value = TextSetting{"names of instances with commas between; without it all are", are_node_names,
                              [](const SettingsTarget& to, std::string_view names) {
-                               to.settings.blocks.neighbours = words_of(names);
+                               to.settings.blocks.neighbours = names_in(names);
                              }}},
     SettingKey{.section = kRouter,
                .name = "Forward",

@@ -1,5 +1,6 @@
 // A program in versions of which some can take over from the first one while it runs, and others cannot: see
 // CMakeLists.txt for what each is made with.
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <ctime>
@@ -71,8 +72,16 @@ void cycle() {
 
 // The figure of the task in the last report's cycle is in the program's own memory.
 void report() {
+  unsigned long counter = 0;
+  std::array<unsigned long, 3> others{};
+  do {  // until no cycle of the other task, which interrupts this one, came between the looks
+    counter = const_cast<volatile unsigned long&>(machine.counter);
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+    others = {*area, *kept, fresh};
+    std::atomic_signal_fence(std::memory_order_seq_cst);
+  } while (counter != const_cast<volatile unsigned long&>(machine.counter));
   plc::log("version %d counter %lu area %lu kept %lu fresh %lu works %lu own figures %d init saw area %d",
-           VERSION, machine.counter, *area, *kept, fresh, machine.works,
+           VERSION, counter, others[0], others[1], others[2], machine.works,
            plc_current_task()->tMaxCycleTime > 0 ? 1 : 0, area_in_init != nullptr ? 1 : 0);
 }
 
