@@ -4,8 +4,9 @@
 #   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
 #   tests/run.sh NAME...   only tests whose name matches one of these (ctest -R), in the plain build
 #   tests/run.sh --help    this text
-# A test has one attempt, unless tests/retries.txt says why it has two. Each second run, each further round within a test and
-# each skipped test is printed at the end; one that is skipped and not listed in tests/skips.txt fails the run.
+# A test has one attempt, unless tests/retries.txt says why it has two; up to three others of a build have two as well. Each second
+# run, each further round within a test and each skipped test is printed at the end. One that is skipped and not listed in
+# tests/skips.txt fails the run.
 # Each step says how long it took, and the seconds of all processors together.
 set -uo pipefail
 cd "$(dirname "$0")/.."

@@ -3,10 +3,11 @@
 
 Usage: suite.py [--jobs N] BUILD [CTEST_OPTION...]
 
-A test that fails runs again only if tests/retries.txt names it. A test that is skipped although tests/skips.txt does not
-name it fails the run, and so does one that needed a further round without being listed. So does a case of a test program
-that ctest does not have exactly once, and so does a line of these two lists that matches no test. Shares of whole programs
-(cases.py) count with each of their cases. The last lines name the tests that took most processor time.
+A test that fails runs again if tests/retries.txt names it, and so do a few others, each of which is printed with what it said
+at first. More than a few fail the run. A test that is skipped although tests/skips.txt does not name it fails the run, and so
+does one that needed a further round without being listed. So does a case of a test program that ctest does not have exactly
+once, and so does a line of these two lists that matches no test. Shares of whole programs (cases.py) count with each of their
+cases. The last lines name the tests that took most processor time.
 """
 
 import argparse
@@ -28,6 +29,7 @@ FURTHER_ROUND = re.compile(r"^further round: (\S+): (.*)$", re.MULTILINE)
 ONE_CASE = "--gtest_filter="
 PROGRAM = re.compile(r"TEST_EXECUTABLE \[==\[(.*?)\]==\]")  # in what gtest_discover_tests writes
 COSTLY = 20  # tests named with their processor time
+UNLISTED = 3  # tests of a build that may run again although no list names them: machines stand still
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -41,6 +43,7 @@ class Suite:
         self.build, self.jobs, self.options = build, jobs, options
         self.shares = build / "Testing" / "shares"
         self.outputs = {}  # of what failed in its last run
+        self.first_outputs = {}  # of what failed in its first one
         self.rounds = []  # further ones: test and reason
         self.seconds = {}  # of processors, by test
 
@@ -78,7 +81,9 @@ class Suite:
             self.rounds += FURTHER_ROUND.findall(output)
             if status == "fail":
                 self.outputs[name] = output
+                self.first_outputs.setdefault(name, output)
             cases = self.cases_of(name)
+            self.first_outputs.update({case: output for case, result in cases.items() if result == "retried"})
             results.update(cases)
             # A share stands for itself if it could not tell which of its cases failed.
             if not cases or (status == "fail" and "failed" not in cases.values()):
@@ -181,6 +186,9 @@ def main():
     if results is None:
         return 1
     again = [name for name, result in results.items() if result == "failed" and retries.reason(name, "time", "open")]
+    others = [name for name, result in results.items() if result == "failed" and name not in again]
+    if len(others) <= UNLISTED:
+        again += others
     for name, result in (suite.run_again(again) if again else {}).items():
         results[name] = "retried" if result == "passed" else "failed"
 
@@ -189,8 +197,15 @@ def main():
     unexpected = [name for name in named["skipped"] if skips.reason(name) is None]
     for name, output in suite.outputs.items():
         print(f"----- {name} failed with:", *end_of(output), sep="\n")
+    unlisted_again = [name for name in named["retried"] if not retries.reason(name, "time", "open")]
+    for name in unlisted_again:
+        print(f"----- {name} failed at first with:", *end_of(suite.first_outputs.get(name, "")), sep="\n")
     for name in named["retried"]:
-        print(f"second run: {name}: {retries.reason(name, 'time', 'open')}")
+        print(f"second run: {name}: {retries.reason(name, 'time', 'open') or 'NOT LISTED (tests/retries.txt): find out why'}")
+    if len(unlisted_again) <= UNLISTED:
+        unlisted_again = []
+    for name in unlisted_again:
+        print(f"FAILED: {name}: one of more than {UNLISTED} that no list names")
     unlisted = [name for name, _ in suite.rounds if retries.reason(name, "rounds") is None]
     for name, what in suite.rounds:
         print(f"further round: {name}: {what}: {retries.reason(name, 'rounds') or 'NOT EXPECTED (tests/retries.txt)'}")
@@ -205,7 +220,7 @@ def main():
     for place, pattern in of_no_test:
         print(f"FAILED: {place}: no test matches {pattern}: remove the line, or name the test as it is called")
     suite.print_costly()
-    failed = {*named["failed"], *unexpected, *unlisted, *wrongly_listed, *of_no_test}
+    failed = {*named["failed"], *unexpected, *unlisted, *unlisted_again, *wrongly_listed, *of_no_test}
     passed = {name for name, result in results.items() if result in ("passed", "retried")} - failed
     print(f"{len(passed)} passed, {len(failed)} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")

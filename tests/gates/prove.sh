@@ -412,6 +412,17 @@ suite() {
   PYTHONDONTWRITEBYTECODE=1 "$plot/suite/suite.py" "$plot/two"
 }
 suite "$skip" "$round" >"$plot/log" 2>&1 || { echo "the suite of two listed tests fails:"; cat "$plot/log"; failed=1; }
+plant_flaky() { # plant_flaky N: a test that fails once
+  local flaky=$plot/flaky$1
+  echo "add_test(Planted.Flaky$1 sh -c \"test -e $flaky || { touch $flaky; exit 1; }\")" >>"$plot/two/CTestTestfile.cmake"
+}
+plant_flaky 1
+suite "$skip" "$round" >"$plot/log" 2>&1 || { echo "the suite fails with one test that fails once:"; cat "$plot/log"; failed=1; }
+grep -q "^second run: Planted.Flaky1: NOT LISTED" "$plot/log" || { echo "a second run is not told:"; cat "$plot/log"; failed=1; }
+rm "$plot/flaky1"
+for i in 2 3 4; do plant_flaky "$i"; done
+must_be_red "suite: four that fail once" "FAILED: Planted.Flaky4" suite "$skip" "$round"
+touch "$plot"/flaky{1,2,3,4}
 must_be_red "suite: skipped and not listed" "skipped: Planted.Skip: NOT EXPECTED (tests/skips.txt)" suite "" "$round"
 must_be_red "suite: skipped and listed for another kind" "skipped: Planted.Skip: NOT EXPECTED" suite "thread Planted.Skip planted" "$round"
 must_be_red "suite: further round and not listed" "further round: Planted.Round: a core stood still: NOT EXPECTED (tests/retries.txt)" suite "$skip" ""
