@@ -29,12 +29,11 @@ import sys
 import tempfile
 import time
 
-from expected import Expected
+from expected import UNLISTED, Expected
 
 EVENT = re.compile(rb"\[( RUN      |       OK |  FAILED  |  SKIPPED )\] ([\w./]+)")
 RESULTS = {b"       OK ": "passed", b"  FAILED  ": "failed", b"  SKIPPED ": "skipped"}
 PR_SET_PDEATHSIG = 1
-UNLISTED = 3  # cases that may run again although --retries does not name them (suite.py)
 # tests/run.sh leaves this out of processes that run one case. One that runs many of them pays for it once.
 ENVIRONMENT = {**os.environ, "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":detect_stack_use_after_return=1"}
 
@@ -224,7 +223,7 @@ def main():
 
     retries = Expected(options.retries, options.kind)
     failed = [case for case, result in work.results.items() if result[0] == "failed"]
-    unlisted = [case for case in failed if not retries.reason(case, "time", "open")]
+    unlisted = [case for case in failed if not retries.second_run(case)]
     for case in [case for case in failed if case not in unlisted or len(unlisted) <= UNLISTED]:
         print(f"again: {case}\n{work.results[case][2]}")
         second = Share(options.program, options.limit)

@@ -6,6 +6,9 @@ import fnmatch
 HELD_BY = {"any": "plain", "plain": "plain", "sanitized": "address", "address": "address", "thread": "thread"}
 
 
+UNLISTED = 3  # tests of a build that may run again although no list names them: machines stand still
+
+
 class Expected:
     """Each line: KIND PATTERN REASON. KIND: any, plain, sanitized, address or thread. PATTERN: a name with * and ?."""
 
@@ -31,6 +34,10 @@ class Expected:
             if fnmatch.fnmatchcase(name, pattern) and (not labels or reason.startswith(labels)):
                 return reason
         return None
+
+    def second_run(self, name):
+        """Why it may run again, by tests/retries.txt; None: that does not name it."""
+        return self.reason(name, "time", "open")
 
     def of_no_test(self, names):
         """The lines that this kind of build holds, and that match none of these tests: place and pattern."""

@@ -110,7 +110,6 @@ join() {
   end_step "$2" "$code" "$seconds" "$processors" "$own/$1.log"
 }
 
-executables=  # flags for linking them
 configure() { # configure DIR OPTIONS...
   local dir=$1
   shift
@@ -118,7 +117,7 @@ configure() { # configure DIR OPTIONS...
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   # lld links in a fifth of the time of binutils, by which the demo is linked, as users do.
   cmake -S . -B "$dir" -G Ninja -DCMAKE_COMPILE_WARNING_AS_ERROR=ON "${launcher[@]}" \
-    -DCMAKE_EXE_LINKER_FLAGS="-fuse-ld=lld $executables" -DCMAKE_SHARED_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_MODULE_LINKER_FLAGS=-fuse-ld=lld "$@"
+    -DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_SHARED_LINKER_FLAGS=-fuse-ld=lld -DCMAKE_MODULE_LINKER_FLAGS=-fuse-ld=lld "$@"
 }
 # Several files at a time, as most of the work is the headers of others. Where one is compiled again after an edit these are a few,
 # elsewhere all of a library.
@@ -133,9 +132,10 @@ build_plain() {
 # By clang, which takes half of g++'s time for it; so a second compiler has seen everything. Not position independent: a sanitizer
 # adds so many addresses to a program that relocating them is half of its start.
 build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
-  local dir=$1 sanitizers=$2 target=$3 executables=-no-pie
+  local dir=$1 sanitizers=$2 target=$3
   shift 3
   configure "$dir" -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DSANITIZER="$sanitizers" -DPLCHOST_TESTS=ON \
+    -DCMAKE_EXE_LINKER_FLAGS="-fuse-ld=lld -no-pie" \
     -DPLCHOST_MODBUS=ON -DPLCHOST_BENCH=OFF "${whole_unity[@]}" \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
     cmake --build "$dir" -j "$jobs" --target "$target"
@@ -175,7 +175,7 @@ tidy() {
     cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
-# One fuzzer starts a program that the plain build has made. Optimized, they would take twice as long to compile as they run.
+# One fuzzer starts a program that the plain build has made. Optimized, they would take nearly twice as long to compile.
 build_fuzzers() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
     -DPLCHOST_MODBUS=ON -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_GATED_CYCLONE="$PWD/$build/bin/gated_cyclone" "${whole_unity[@]}" \

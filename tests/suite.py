@@ -20,7 +20,7 @@ import time
 import xml.etree.ElementTree as ElementTree
 
 from cases import list_cases
-from expected import Expected
+from expected import UNLISTED, Expected
 from processor_time import ProcessorTime
 
 OUTPUT_LINES = 40  # of a failed case, repeated at the end
@@ -29,7 +29,6 @@ FURTHER_ROUND = re.compile(r"^further round: (\S+): (.*)$", re.MULTILINE)
 ONE_CASE = "--gtest_filter="
 PROGRAM = re.compile(r"TEST_EXECUTABLE \[==\[(.*?)\]==\]")  # in what gtest_discover_tests writes
 COSTLY = 20  # tests named with their processor time
-UNLISTED = 3  # tests of a build that may run again although no list names them: machines stand still
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -185,26 +184,25 @@ def main():
     results = suite.run()
     if results is None:
         return 1
-    again = [name for name, result in results.items() if result == "failed" and retries.reason(name, "time", "open")]
-    others = [name for name, result in results.items() if result == "failed" and name not in again]
-    if len(others) <= UNLISTED:
-        again += others
+    failed_once = [name for name, result in results.items() if result == "failed"]
+    others = [name for name in failed_once if not retries.second_run(name)]
+    again = [name for name in failed_once if name not in others or len(others) <= UNLISTED]
     for name, result in (suite.run_again(again) if again else {}).items():
-        results[name] = "retried" if result == "passed" else "failed"
+        if name in again:  # not a case of a share: cases.py runs these again
+            results[name] = "retried" if result == "passed" else "failed"
 
     named = {what: sorted(name for name, result in results.items() if result == what)
              for what in ("failed", "skipped", "retried")}
     unexpected = [name for name in named["skipped"] if skips.reason(name) is None]
     for name, output in suite.outputs.items():
         print(f"----- {name} failed with:", *end_of(output), sep="\n")
-    unlisted_again = [name for name in named["retried"] if not retries.reason(name, "time", "open")]
+    unlisted_again = [name for name in named["retried"] if not retries.second_run(name)]
     for name in unlisted_again:
         print(f"----- {name} failed at first with:", *end_of(suite.first_outputs.get(name, "")), sep="\n")
     for name in named["retried"]:
-        print(f"second run: {name}: {retries.reason(name, 'time', 'open') or 'NOT LISTED (tests/retries.txt): find out why'}")
-    if len(unlisted_again) <= UNLISTED:
-        unlisted_again = []
-    for name in unlisted_again:
+        print(f"second run: {name}: {retries.second_run(name) or 'NOT LISTED (tests/retries.txt): find out why'}")
+    too_many = unlisted_again if len(unlisted_again) > UNLISTED else []
+    for name in too_many:
         print(f"FAILED: {name}: one of more than {UNLISTED} that no list names")
     unlisted = [name for name, _ in suite.rounds if retries.reason(name, "rounds") is None]
     for name, what in suite.rounds:
@@ -220,7 +218,7 @@ def main():
     for place, pattern in of_no_test:
         print(f"FAILED: {place}: no test matches {pattern}: remove the line, or name the test as it is called")
     suite.print_costly()
-    failed = {*named["failed"], *unexpected, *unlisted, *unlisted_again, *wrongly_listed, *of_no_test}
+    failed = {*named["failed"], *unexpected, *unlisted, *too_many, *wrongly_listed, *of_no_test}
     passed = {name for name, result in results.items() if result in ("passed", "retried")} - failed
     print(f"{len(passed)} passed, {len(failed)} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")
