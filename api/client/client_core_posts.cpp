@@ -6,6 +6,7 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/client_core.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/futex.hpp"
 
