@@ -27,7 +27,7 @@ export PYTHONDONTWRITEBYTECODE=1  # the tree of the sources stays as it was
 export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
 step=0
-steps=12
+steps=13
 # Programs that the tests crash on purpose must end by their signal, not by a sanitizer's report.
 # One of them is preloaded with a clock device, before the sanitizer's own library. Each control program has a
 # plc_app_abi, also where one is loaded for all others to see. One test forks beside threads of others, and starts one.
@@ -175,6 +175,13 @@ tidy() {
     cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
+# As users build: file by file.
+alone() {
+  configure .build/alone -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF \
+    -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug &&
+    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py .build/alone
+}
+
 # One fuzzer starts a program that the plain build has made. Optimized, they would take nearly twice as long to compile.
 build_fuzzers() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
@@ -212,7 +219,7 @@ case "${1:-}" in
   "")
     run "packages" .ci/packages test
     tests/left_behind.py begin "$own/before"
-    run_ahead gates build_asan build_tsan tidy build_fuzzers
+    run_ahead gates build_asan build_tsan tidy alone build_fuzzers
     run "build" build_plain
     join gates "gates, each proven by a planted fault"  # before the tests: one gate looks for what is left behind
     run "tests" tests "$build" "${whole[@]}"
@@ -225,6 +232,7 @@ case "${1:-}" in
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
     join tidy "clang-tidy"
+    join alone "each file compiles by itself"
     join build_fuzzers "fuzzers: build"
     run "fuzzers" fuzz
     run "nothing is left behind" tests/left_behind.py end "$own/before"

@@ -71,14 +71,7 @@ void ClientCore::take_answers(Answers which) {
   if (wants(replies_, replied_)) take_replies();
   if (wants(runs_, run_)) take_runs();
   if (wants(download_acks_, downloaded_)) take_download_acks();
-  std::apply(
-      [&](auto&... pages) {
-        const auto take_from = [&](auto& each) {
-          if (wants(each.from, each.come)) take_pages(each);
-        };
-        (take_from(pages), ...);
-      },
-      pages_);
+  take_pages(which);
 }
 
 template Result<void> ClientCore::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&,

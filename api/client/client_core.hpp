@@ -123,8 +123,7 @@ class ClientCore {
     dds::TopicReader from;
     Inbox<ListingOf<Page>> come;
   };
-  template <class Page>
-  void take_pages(Pages<Page>& pages);
+  void take_pages(Answers which);
   void take_runs();
   void take_download_acks();
   bool take_acks(TimePoint now);
@@ -216,5 +215,7 @@ class ClientCore {
   std::tuple<Posters<plc_EventPost>, Posters<plc_EventBatch>> posters_;
   std::map<std::string, Turns> posting_;
 };
+
+extern template Result<EventPoster*> ClientCore::poster<plc_EventPost>(const std::string& host);
 
 }  // namespace plchost

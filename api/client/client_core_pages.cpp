@@ -19,17 +19,16 @@ constexpr Duration kBusyPause = std::chrono::milliseconds(50);
 
 }  // namespace
 
-template <class Page>
-void ClientCore::take_pages(Pages<Page>& pages) {
-  dds::take_valid_told<Page, dds::kTopicOf<Page>.qos.depth>(
-      pages.from.reader.get(), answering_, [&](const Page& page, const auto& /*info*/) {
-        pages.come.put({page.related_identity, dds::text_of(page.host)}, [&] { return listing_of(page); });
-      });
+void ClientCore::take_pages(Answers which) {
+  const auto take = [&]<class Page>(Pages<Page>& pages) {
+    if (!pages.from || (which != Answers::all && !pages.come.expects_any())) return;
+    dds::take_valid_told<Page, dds::kTopicOf<Page>.qos.depth>(
+        pages.from.reader.get(), answering_, [&](const Page& page, const auto& /*info*/) {
+          pages.come.put({page.related_identity, dds::text_of(page.host)}, [&] { return listing_of(page); });
+        });
+  };
+  std::apply([&](auto&... pages) { (take(pages), ...); }, pages_);
 }
-template void ClientCore::take_pages(Pages<plc_ObjectPage>&);
-template void ClientCore::take_pages(Pages<plc_NodePage>&);
-template void ClientCore::take_pages(Pages<plc_LogPage>&);
-template void ClientCore::take_pages(Pages<plc_VariablePage>&);
 
 template <class Page>
 Async<Result<ListingOf<Page>>> ClientCore::ask_for_page(ApiRequest request, TimePoint deadline) {

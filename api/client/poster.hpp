@@ -129,6 +129,9 @@ class Poster {
   AckAccount account_;
 };
 
+extern template class Poster<plc_EventPost>;
+extern template class Poster<plc_EventBatch>;
+
 using EventPoster = Poster<plc_EventPost>;
 using BatchPoster = Poster<plc_EventBatch>;
 

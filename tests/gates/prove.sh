@@ -324,6 +324,22 @@ sed -i 's/p == 0/p == nullptr/' "$plot/tree/shm/base/planted.cpp"
 echo '[]' >"$plot/tidy/compile_commands.json"
 must_be_red "clang-tidy: nothing" "there is no unit in" "$gates/tidy.sh" "$plot/tidy"
 
+# Joined, these two would compile.
+mkdir -p "$plot/alone"
+echo 'template <class T> T twice(T n);' >"$plot/tree/shm/base/planted.hpp"
+echo 'template <class T> T twice(T n) { return n + n; }' >"$plot/tree/shm/base/planted_definition.hpp"
+echo "[{\"directory\": \"$plot/tree\", \"command\": \"clang++-19 -std=c++23 -I. -c shm/base/planted.cpp -o planted.o\", \"file\": \"$plot/tree/shm/base/planted.cpp\"}]" \
+  >"$plot/alone/compile_commands.json"
+printf '#include "shm/base/planted.hpp"\nint planted(int n) { return twice(n); }\n' >"$plot/tree/shm/base/planted.cpp"
+must_be_red "alone: template without its definition" "instantiation of function 'twice<int>' required here, but no definition is available" \
+  "$gates/alone.py" "$plot/alone"
+echo 'int planted(int n) { return twice(n); }' >"$plot/tree/shm/base/planted.cpp"
+must_be_red "alone: missing include" "use of undeclared identifier 'twice'" "$gates/alone.py" "$plot/alone"
+printf '#include "shm/base/planted.hpp"\n#include "shm/base/planted_definition.hpp"\nint planted(int n) { return twice(n); }\n' >"$plot/tree/shm/base/planted.cpp"
+"$gates/alone.py" "$plot/alone" || { echo "a file with all its includes does not compile by itself"; failed=1; }
+echo '[]' >"$plot/alone/compile_commands.json"
+must_be_red "alone: nothing" "there is no file in" "$gates/alone.py" "$plot/alone"
+
 cat >"$plot/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.25)
 project(planted C CXX)
