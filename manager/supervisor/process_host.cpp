@@ -57,6 +57,8 @@ Result<int> ProcessHost::adopt() {
 Result<int> ProcessHost::adopt_peer() {
   PLCHOST_TRY_ASSIGN(const auto pid, link_.peer_pid());
   PLCHOST_TRY_ASSIGN(auto process, open_process(pid));
+  // Looked at again: had it ended before, its number could mean another process by now.
+  if (link_.is_cut()) return failure(ErrorCode::unavailable, fmt::format("process {} has ended", pid));
   PLCHOST_TRY(follow(process));
   output_.adopt();
   output_.say(LogLevel::info, pid, fmt::format("a new manager has adopted process {}", pid));

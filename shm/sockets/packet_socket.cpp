@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -90,6 +91,11 @@ Result<int> PacketSocket::peer_pid() const {
                                "cannot read the peer of a socket");
   if (!got) return std::unexpected(got.error());
   return static_cast<int>(credentials.pid);
+}
+
+bool PacketSocket::is_cut() const noexcept {
+  pollfd end{.fd = fd_.get(), .events = 0, .revents = 0};
+  return ::poll(&end, 1, 0) > 0;  // without events, only its end or an error
 }
 
 Result<PacketListener> PacketListener::listen(const std::string& path) {

@@ -101,6 +101,23 @@ TEST_F(PacketSocketTest, KnowsThePeer) {
   EXPECT_EQ(server_.peer_pid(), ::getpid());
 }
 
+TEST_F(PacketSocketTest, IsCutWhenThePeerHasClosedItsEnd) {
+  connect();
+  ASSERT_TRUE(server_.send("a packet that nobody takes"));
+  EXPECT_FALSE(client_.is_cut());
+  server_.close();
+  EXPECT_TRUE(client_.is_cut());
+}
+
+TEST_F(PacketSocketTest, IsCutWhenTheListenerHasGoneBeforeItTookTheConnection) {
+  connect();
+  const auto waiting = PacketSocket::connect(path_);
+  ASSERT_TRUE(waiting);
+  EXPECT_FALSE(waiting->is_cut());
+  listener_.reset();
+  EXPECT_TRUE(waiting->is_cut());
+}
+
 TEST_F(PacketSocketTest, AcceptGivesNothingIfNobodyWaits) {
   connect();
   const auto accepted = listener_->accept();
