@@ -43,7 +43,8 @@ template <class Sample>
 inline constexpr bool kHasRow = false;
 
 /// The code of a word; 0, which says so, if it is none of them.
-[[nodiscard]] inline std::uint32_t code_for(std::span<const std::string_view> words, std::string_view word) {
+[[nodiscard]] constexpr std::uint32_t code_for(std::span<const std::string_view> words,
+                                               std::string_view word) {
   for (std::uint32_t code = 1; code < words.size(); ++code)
     if (words[code] == word) return code;
   return 0;

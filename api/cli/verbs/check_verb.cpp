@@ -3,11 +3,13 @@
 #include <memory>
 #include <vector>
 
+#include <code_words.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/status_rows.hpp"
 #include "api/dds/code_names.hpp"
+#include "api/dds/field_info.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -15,7 +17,11 @@ namespace plchost {
 
 namespace {
 
-enum Level : std::uint32_t { kOk, kNote, kWarning, kProblem };
+using Words = dds::words::HostFinding;
+constexpr std::uint32_t kOk = dds::code_for(Words::level, "ok");
+constexpr std::uint32_t kNote = dds::code_for(Words::level, "note");
+constexpr std::uint32_t kWarning = dds::code_for(Words::level, "warning");
+constexpr std::uint32_t kProblem = dds::code_for(Words::level, "problem");
 
 // The sentences of a finding are too long for the columns of a table.
 void print(const plc_HostFinding& finding) {

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
 #include "instances/adapters/iec/tokens.hpp"
+#include "shm/base/task_kind.hpp"
 
 namespace plchost {
 
@@ -20,11 +22,18 @@ using plcopen::ExportedTask;
 using plcopen::ExportedVariable;
 using ExportedKind = ExportedTask::Kind;
 
+// A kind that only a newer host knows is written as one that needs neither interval nor event.
+ExportedKind kind_of(std::uint32_t kind) {
+  const TaskKindTraits* const traits = find_traits(static_cast<TaskKind>(kind));
+  if (traits == nullptr) return ExportedKind::freewheeling;
+  if (traits->has_interval) return ExportedKind::cyclic;
+  if (traits->names_event) return ExportedKind::external;
+  return traits->reads_variable ? ExportedKind::event : ExportedKind::freewheeling;
+}
+
 ExportedTask task_of(const plc_TaskStatus& task) {
-  constexpr std::array<ExportedKind, 4> kKinds{ExportedKind::cyclic, ExportedKind::event,
-                                               ExportedKind::external, ExportedKind::freewheeling};
   return {.name = std::string(dds::text_of(task.task)),
-          .kind = kKinds.at(std::min<std::size_t>(task.kind, kKinds.size() - 1)),
+          .kind = kind_of(task.kind),
           .priority = task.priority,
           .interval_ns = task.interval_ns,
           .event = std::string(dds::text_of(task.external_event))};

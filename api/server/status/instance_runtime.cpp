@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include <code_words.hpp>
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
@@ -12,7 +13,7 @@ namespace plchost {
 namespace {
 
 // The states of control.idl; a stranger may have written another one.
-constexpr std::uint32_t kClockStates = 6;
+constexpr std::uint32_t kClockStates = dds::words::InstanceStatus::clock_state.size();
 
 void add(std::string& problem, std::string_view more) {
   if (more.empty()) return;

@@ -1,8 +1,11 @@
 // Rows, columns and order of status topics as the build makes them from control.idl.
 #include "api/cli/rows/status_rows.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -10,10 +13,17 @@
 
 #include "api/cli/rows/host_rows.hpp"
 #include "api/client/status_count.hpp"
+#include "api/control/host_finding.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
+#include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "shm/base/fault_record.hpp"
 #include "shm/base/task_kind.hpp"
+#include "shm/log/log_line.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/log_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/pool/pool_layout.hpp"
 
 namespace plchost {
@@ -220,6 +230,43 @@ TEST(StatusWords, AreThoseOfTheContract) {
   EXPECT_EQ(dds::transition_state_name(0, 3), "single_cycle");
   EXPECT_EQ(dds::transition_state_name(1, 6), "safe_mode");
   EXPECT_EQ(dds::finding_level_name(3), "problem");
+}
+
+/// "running", as the code of the program calls it; "(plchost::InstanceState)9" if it has no name.
+template <auto kValue>
+std::string name_of() {
+  std::string_view text = __PRETTY_FUNCTION__;
+  text = text.substr(text.find("kValue = ") + std::string_view("kValue = ").size());
+  text = text.substr(0, text.find_first_of(";]"));
+  const auto colons = text.starts_with('(') ? std::string_view::npos : text.rfind("::");
+  return std::string(colons == std::string_view::npos ? text : text.substr(colons + 2));
+}
+
+template <class Code, std::size_t... kIndex>
+std::vector<std::string> names_of(std::index_sequence<kIndex...> /*codes*/) {
+  return {name_of<static_cast<Code>(kIndex)>()...};
+}
+
+/// Each word is the name of the enumerator of that number, and there is no further one.
+template <class Code, std::size_t kSize>
+void expect_names(const std::array<std::string_view, kSize>& words) {
+  std::vector<std::string> wanted(words.begin(), words.end());
+  for (std::string& word : wanted) std::ranges::replace(word, '-', '_');
+  EXPECT_THAT(names_of<Code>(std::make_index_sequence<kSize>()), testing::ElementsAreArray(wanted));
+  EXPECT_TRUE(name_of<static_cast<Code>(kSize)>().starts_with('('))
+      << "the contract has no word for " << name_of<static_cast<Code>(kSize)>();
+}
+
+TEST(StatusWords, AreTheNamesOfTheCodesInThePrograms) {
+  expect_names<InstanceState>(dds::words::InstanceStatus::state);
+  expect_names<RestartPolicy>(dds::words::InstanceStatus::restart_policy);
+  expect_names<ClockState>(dds::words::InstanceStatus::clock_state);
+  expect_names<PageTaskState>(dds::words::TaskStatus::state);
+  expect_names<ApplicationState>(dds::words::Transition::from_state);
+  expect_names<TransitionSource>(dds::words::Transition::source);
+  expect_names<LogLevel>(dds::words::LogRecord::level);
+  expect_names<LogSource>(dds::words::LogRecord::source);
+  expect_names<FindingLevel>(dds::words::HostFinding::level);
 }
 
 TEST(StatusWords, OfTheKindsOfTasksAreThoseOfTheirTable) {
