@@ -89,7 +89,7 @@ Result<void> ManagedInstance::check_online() const {
 void ManagedInstance::begin_change() {
   if (auto good = check_online(); !good) return finish(good.error().code, good.error().message);
   operation_->step = Step::forwarded;
-  const auto number = send_limited(ControlVerb::change_application);
+  const auto number = send_limited(ControlVerb::change_application, operation_->request);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
   host_.set_timer(after(limit_of(ControlVerb::change_application)));

@@ -28,6 +28,10 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
                     "into the file and reload that for anything else",
                     config_.name));
   }
+  if (is_order(checked.verb)) {
+    spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
+    return begin_order(std::move(checked), std::move(reply));
+  }
   if (!makes_room_for(checked.verb)) {
     return refuse(ErrorCode::busy, fmt::format("instance '{}' is busy with '{}'; try again when it is done",
                                                config_.name, to_string(operation_->request.verb)));
@@ -226,11 +230,10 @@ void ManagedInstance::forward() {
     return finish(in_time.error().code, in_time.error().message);
   }
   operation_->step = Step::forwarded;
-  const auto number = send_limited(operation_->request.verb);
+  const auto number = send_limited(operation_->request.verb, operation_->request);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
-  operation_->until = after(limit_of(operation_->request.verb));
-  host_.set_timer(operation_->until);
+  host_.set_timer(after(limit_of(operation_->request.verb)));
   if (operation_->request.verb == ControlVerb::stop) {
     set_state(Phase::up, InstanceState::stopping, problem_when_up());
   }
@@ -304,7 +307,6 @@ void ManagedInstance::finish(ErrorCode code, const std::string& text) {
     done.reply(ControlReply{
         .number = done.request.number, .code = code, .text = ended.empty() ? text : text + "; " + ended});
   }
-  resume_aside();
 }
 
 }  // namespace plchost

@@ -30,7 +30,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   const bool start_waits = operation_ && operation_->request.verb == ControlVerb::start;
   const bool nobodys_word = unheard_ && !wish_known_ && !commanded_ && !start_waits;
   const SetupStep reached = step_;
-  if (aside_) end_aside(ErrorCode::unavailable, fmt::format("its process has ended: {}", status.describe()));
+  end_orders(ErrorCode::unavailable, fmt::format("its process has ended: {}", status.describe()));
   forget_signs();
   host_.set_timer(std::nullopt);
   if (phase_ == Phase::ending) return asked_end();

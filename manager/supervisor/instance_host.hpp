@@ -37,6 +37,8 @@ class InstanceHost {
   [[nodiscard]] virtual Result<void> check_application(const LaunchOptions& options) = 0;
   /// The process's report in its page; nothing if it has made none yet.
   [[nodiscard]] virtual std::optional<InstanceRuntime> runtime() = 0;
+  /// There is no process: the report of the last one, if it has left its page.
+  [[nodiscard]] virtual std::optional<InstanceRuntime> left_runtime() const = 0;
   /// The processor time that the process wants of its core, and gets now. Reads a file for each of its
   /// threads.
   [[nodiscard]] virtual ProcessorUse processor_use() = 0;

@@ -192,8 +192,7 @@ void ManagedInstance::fall_silent(std::string_view known) {
                   std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count()));
   carry_out(decided({.cause = EndCause::silent, .order = order()}), std::string(status_.problem.view()));
   host_.forget_requests();
-  if (aside_)
-    end_aside(ErrorCode::timed_out, fmt::format("it is in exception now: {}", status_.problem.view()));
+  end_orders(ErrorCode::timed_out, fmt::format("it is in exception now: {}", status_.problem.view()));
   if (!operation_) return;
   if (operation_->step == Step::until_up) return carry_out(operation_->request.verb);
   if (operation_->step != Step::forwarded) return;

@@ -166,7 +166,7 @@ std::string ManagedInstance::text_of_beginning(EndCause cause) const {
 }
 
 void ManagedInstance::ended_unwatched() {
-  const auto left = host_.runtime();
+  const auto left = host_.left_runtime();
   const std::string forces = ended_forces_text(left ? left->forces : 0);
   host_.end_outputs();
   start_kind_ = StartKind::after_fault;

@@ -59,7 +59,7 @@ void ManagedInstance::release() {
 void ManagedInstance::shut_down() {
   shutting_down_ = true;
   next_ = Next::nothing;
-  if (aside_) end_aside(ErrorCode::unavailable, "the manager is shutting down");
+  end_orders(ErrorCode::unavailable, "the manager is shutting down");
   if (operation_) finish(ErrorCode::unavailable, "the manager is shutting down");
   carry_out(decided({.cause = EndCause::manager_ends}), "");
 }
@@ -86,8 +86,8 @@ void ManagedInstance::on_report(const SetupReport& report) {
 void ManagedInstance::on_reply(const ControlReply& reply) {
   if (operation_ && operation_->step == Step::forwarded && reply.number == operation_->forwarded_number) {
     finish_forwarded(reply);
-  } else if (aside_ && reply.number == aside_->forwarded_number) {
-    end_aside(reply.code, reply.text);
+  } else if (ends_order(reply)) {
+    settled_ = surroundings_.now();
   } else if (phase_ == Phase::adopting) {
     const bool awaited = reply.number == asked_number_;
     if (hear(reply) || awaited) finish_adoption("");
@@ -161,12 +161,8 @@ void ManagedInstance::on_timer() {
       return adoption_timed_out();
     case Phase::up:
       if (operation_ && operation_->step == Step::forwarded) {
-        const Duration limit =
-            limit_of(takes_over() ? ControlVerb::change_application : operation_->request.verb);
         finish(ErrorCode::timed_out,
-               fmt::format("'{}' did not answer within {} s{}{}", config_.name,
-                           std::chrono::duration_cast<std::chrono::seconds>(limit).count(),
-                           starved_by_.empty() ? "" : ": ", starved_by_));
+               no_answer_text(takes_over() ? ControlVerb::change_application : operation_->request.verb));
         look_again();
       }
       return;
@@ -279,6 +275,7 @@ bool ManagedInstance::rests() const noexcept {
 }
 
 void ManagedInstance::refresh() {
+  end_late_orders();
   if (!operation_ && !shutting_down_ && rests()) {
     const Decision decision = decided({.cause = EndCause::idle, .order = order()});
     carry_out(decision, last_end_);
@@ -340,8 +337,13 @@ std::string ManagedInstance::core_problem() {
                      fmt::join(cores, ", "), config_.core);
 }
 
-Result<std::uint64_t> ManagedInstance::send_limited(ControlVerb verb) {
-  const ControlRequest& request = operation_->request;
+std::string ManagedInstance::no_answer_text(ControlVerb verb) const {
+  return fmt::format("'{}' did not answer within {} s{}{}", config_.name,
+                     std::chrono::duration_cast<std::chrono::seconds>(limit_of(verb)).count(),
+                     starved_by_.empty() ? "" : ": ", starved_by_);
+}
+
+Result<std::uint64_t> ManagedInstance::send_limited(ControlVerb verb, const ControlRequest& request) {
   const std::int64_t ours = boot_time_ns() + limit_of(verb).count();
   return send(verb, request.argument, request.limit_ns == 0 ? ours : std::min(ours, request.limit_ns));
 }

@@ -56,11 +56,13 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // * Nothing is begun after the time limit of its command, also if it waited for the process or for the trial of a file
 //   meanwhile. The process gets the lesser of that limit and limit_of() from now.
 //
-// * A task of a single cycle can halt at a breakpoint. So commands of the debugger and for variables are carried out
-//   beside it, and stop, reset and restart break it off.
+// * Orders are commands of the debugger and for variables. The process carries them out when no task is in a cycle, up to
+//   2 s later. No other command waits for them, and they go on beside a stop and beside each other.
+// * A task of a single cycle can halt at a breakpoint. So orders are carried out beside it, and stop, reset and restart
+//   break it off.
 // * A command that the process has not taken when it falls silent is never begun, also if it answers again.
 //
-// Commands: one at a time; another one is answered with busy. A command that changes a process waits until the process
+// Commands but orders: one at a time; another one is answered with busy. A command that changes a process waits until the process
 // is up. The reply comes when the thing is done, when the process ended instead, or at the limit.
 //
 //   command                  process is up                                held, backing off     down
@@ -191,8 +193,13 @@ class ManagedInstance : public InstanceEvents {
     ControlReplyFunction reply;
     Step step = Step::until_up;
     std::uint64_t forwarded_number = 0;
-    TimePoint until{};      // the answer to that is awaited
     std::string refused{};  // why what was to be loaded did not come up; empty: it did
+  };
+  struct ForwardedOrder {
+    ControlRequest request;
+    ControlReplyFunction reply;
+    std::uint64_t number = 0;
+    TimePoint until;  // its answer is awaited
   };
 
   // Commands: instance_commands.cpp, application_commands.cpp
@@ -218,12 +225,19 @@ class ManagedInstance : public InstanceEvents {
   void apply_loaded_application();
   void take_back_application(const std::string& why);
   void forward_or_wait();
-  // A single cycle, and commands beside it: instance_single_cycle.cpp
-  /// Whether a command of that kind may begin now.
+  // Orders, and what breaks a single cycle off: instance_orders.cpp
+  /// A command that is carried out now beside others, and that no other one waits for.
+  [[nodiscard]] bool is_order(ControlVerb verb) const noexcept;
+  void begin_order(ControlRequest request, ControlReplyFunction reply);
+  /// false: it is not the answer of an order.
+  bool ends_order(const ControlReply& reply);
+  void end_order(std::vector<ForwardedOrder>::iterator order, ErrorCode code, const std::string& text);
+  void end_orders(ErrorCode code, const std::string& text);
+  void end_late_orders();
+  [[nodiscard]] bool waits_for_single_cycle() const noexcept;
+  /// Whether another command may begin now.
   [[nodiscard]] bool makes_room_for(ControlVerb verb);
-  /// The single cycle that has made room is the command under way again, if there is one.
-  void resume_aside();
-  void end_aside(ErrorCode code, const std::string& text);
+  [[nodiscard]] std::string no_answer_text(ControlVerb verb) const;
   void forward();
   void finish(ErrorCode code, const std::string& text);
   void look_again();
@@ -314,9 +328,9 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] TimePoint after(Duration duration) const { return surroundings_.now() + duration; }
   [[nodiscard]] Result<std::uint64_t> send(ControlVerb verb, const std::string& argument = {},
                                            std::int64_t limit_ns = 0);
-  /// With the argument of the command that is under way. The process begins with it while somebody waits: the
-  /// client, and this manager.
-  [[nodiscard]] Result<std::uint64_t> send_limited(ControlVerb verb);
+  /// With the argument of the command. The process begins with it while somebody waits: the client, and this
+  /// manager.
+  [[nodiscard]] Result<std::uint64_t> send_limited(ControlVerb verb, const ControlRequest& request);
 
   InstanceConfig config_;
   const Surroundings& surroundings_;
@@ -376,7 +390,7 @@ class ManagedInstance : public InstanceEvents {
   bool unheard_ = false;   // adopted, and it has said nothing of itself yet
   std::string unadopted_;  // why it is still being adopted after its limit, for the problem text
   std::optional<Operation> operation_;
-  std::optional<Operation> aside_;       // a single cycle that has made room for operation_
+  std::vector<ForwardedOrder> orders_;   // beside it; the process answers each
   std::int64_t unix_offset_ns_ = 0;      // of the manager's time, taken once
   std::optional<InstanceWish> earlier_;  // as the manager before left it
   std::string unreadable_;               // why it is not known; empty: it is

@@ -199,6 +199,11 @@ std::optional<InstanceRuntime> ProcessHost::runtime() {
   return current;
 }
 
+std::optional<InstanceRuntime> ProcessHost::left_runtime() const {
+  const auto left = InstancePageReader::open(settings_.pool, settings_.name);
+  return left ? left->runtime() : std::nullopt;
+}
+
 void ProcessHost::end_outputs() {
   plchost::end_outputs(settings_.pool, settings_.name);
   DebugPage::remove(settings_.pool, settings_.name);  // nothing halts there any more

@@ -37,6 +37,7 @@ class ProcessHost : public InstanceHost {
   void set_timer(std::optional<TimePoint> when) override;
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override;
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
+  [[nodiscard]] std::optional<InstanceRuntime> left_runtime() const override;
   [[nodiscard]] ProcessorUse processor_use() override;
   [[nodiscard]] ProcessorShare processor_share() override;
   [[nodiscard]] std::string processor_taker() override;

@@ -115,6 +115,17 @@ until_true 20 ended
 until_true 20 follows 21
 is "$(forces)" "" || fail "$(plcctl list forces)"
 
+echo "- forces that end while no manager runs are told by the next one"
+plcctl force variable line1 line.total=7
+pid=$(instance line1 pid)
+kill -KILL "${managers[-1]}"
+wait "${managers[-1]}" 2>/dev/null || true
+kill -KILL "$pid"
+start_manager cell
+unwatched() { instance line1 problem | grep -q 'ended while no manager ran; 1 force ended'; }
+until_true 20 unwatched
+until_true 20 follows 21
+
 echo "- an instance that stands still answers no longer, the others do"
 pid=$(instance line1 pid)
 kill -STOP "$pid"

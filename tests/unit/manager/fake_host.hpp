@@ -35,6 +35,7 @@ class FakeHost : public InstanceHost {
     return {};
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
+  [[nodiscard]] std::optional<InstanceRuntime> left_runtime() const override { return left; }
   [[nodiscard]] ProcessorUse processor_use() override { return use; }
   [[nodiscard]] ProcessorShare processor_share() override { return share; }
   [[nodiscard]] std::string processor_taker() override { return taker; }
@@ -51,6 +52,7 @@ class FakeHost : public InstanceHost {
   LaunchOptions launch_checked;  // the last one
   std::optional<TimePoint> timer;
   std::optional<InstanceRuntime> page;
+  std::optional<InstanceRuntime> left;  // by a process that has ended
   std::optional<int> adoptable;
   ProcessorUse use;
   ProcessorShare share;

@@ -128,6 +128,37 @@ TEST_F(ManagedLife, CarriesOutCommandsForATaskThatHaltsInASingleCycle) {
   EXPECT_EQ(take_reply().code, ErrorCode::ok) << "of the debugger";
 }
 
+TEST_F(ManagedLife, LetsNoCommandWaitForAnOrderThatWaits) {
+  bring_up();
+  ask(ControlVerb::write_variable, "n=1");
+  const std::uint64_t first = host_.requests.back().number;
+  ask(ControlVerb::force_variable, "m=2");
+  const std::uint64_t second = host_.requests.back().number;
+  ask(ControlVerb::stop);
+  EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop);
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok) << "of the stop";
+  sut().on_reply({.number = second, .code = ErrorCode::ok, .text = "'m' is forced"});
+  EXPECT_EQ(take_reply().text, "'m' is forced");
+  ask(ControlVerb::reset);
+  sut().on_reply({.number = first, .code = ErrorCode::timed_out, .text = "nothing is changed"});
+  EXPECT_EQ(take_reply().text, "nothing is changed");
+  sut().on_exit(exited_with(0));
+  report_ready();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok) << "of the reset";
+}
+
+TEST_F(ManagedLife, AnswersAnOrderThatItsProcessDoesNot) {
+  bring_up();
+  ask(ControlVerb::write_variable, "n=1");
+  ask(ControlVerb::stop);
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok) << "of the stop";
+  now_ += kCommandLimit;
+  sut().refresh();
+  EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
+}
+
 TEST_F(ManagedLife, BreaksASingleCycleOffForAStopAndAReset) {
   for (const ControlVerb verb : {ControlVerb::stop, ControlVerb::reset, ControlVerb::restart}) {
     make();

@@ -313,8 +313,8 @@ TEST_P(InstanceWishes, TellOfForcesThatEndedWhileNoManagerRan) {
   if (GetParam() == Death::power_cut) return;
   bring_up();
   end_manager();
-  host_.page = InstanceRuntime{};
-  host_.page->forces = 2;
+  host_.left = InstanceRuntime{};
+  host_.left->forces = 2;
   begin_next_manager();
   EXPECT_THAT(problem(), HasSubstr("ended while no manager ran; 2 forces ended"));
 }

@@ -1,0 +1,89 @@
+// Orders: commands for variables and to the debugger, beside all others. And what breaks a single cycle off.
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "manager/supervisor/managed_instance.hpp"
+#include "shm/log/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::array kOrders = {ControlVerb::debug, ControlVerb::write_variable, ControlVerb::force_variable,
+                                ControlVerb::unforce_variable};
+constexpr std::array kBreakOff = {ControlVerb::stop, ControlVerb::reset, ControlVerb::reset_cold,
+                                  ControlVerb::restart};
+
+bool contains(const auto& verbs, ControlVerb verb) {
+  return std::ranges::find(verbs, verb) != verbs.end();
+}
+
+}  // namespace
+
+bool ManagedInstance::waits_for_single_cycle() const noexcept {
+  return operation_ && operation_->step == Step::forwarded &&
+         operation_->request.verb == ControlVerb::single_cycle;
+}
+
+bool ManagedInstance::is_order(ControlVerb verb) const noexcept {
+  return contains(kOrders, verb) && phase_ == Phase::up && !silent_ &&
+         (!operation_ || waits_for_single_cycle());
+}
+
+// They wait for a moment in which no task is in a cycle, or for a task that halts, and nothing waits for
+// them.
+void ManagedInstance::begin_order(ControlRequest request, ControlReplyFunction reply) {
+  const auto refuse = [&](ErrorCode code, std::string text) {
+    reply(ControlReply{.number = request.number, .code = code, .text = std::move(text)});
+  };
+  const auto number = send_limited(request.verb, request);
+  if (!number) return refuse(number.error().code, number.error().describe());
+  const TimePoint until = after(limit_of(request.verb));
+  orders_.push_back(
+      {.request = std::move(request), .reply = std::move(reply), .number = *number, .until = until});
+}
+
+bool ManagedInstance::ends_order(const ControlReply& reply) {
+  const auto order = std::ranges::find(orders_, reply.number, &ForwardedOrder::number);
+  if (order == orders_.end()) return false;
+  end_order(order, reply.code, reply.text);
+  return true;
+}
+
+void ManagedInstance::end_order(std::vector<ForwardedOrder>::iterator order, ErrorCode code,
+                                const std::string& text) {
+  // Taken out first: the receiver of the reply may ask for the next thing at once.
+  const ForwardedOrder done = std::move(*order);
+  orders_.erase(order);
+  if (code != ErrorCode::ok) {
+    spdlog::warn("instance {}: {} failed: {}", config_.name, to_string(done.request.verb), text);
+  }
+  done.reply(ControlReply{.number = done.request.number, .code = code, .text = text});
+}
+
+void ManagedInstance::end_orders(ErrorCode code, const std::string& text) {
+  while (!orders_.empty()) end_order(orders_.begin(), code, text);
+}
+
+void ManagedInstance::end_late_orders() {
+  const auto is_late = [this](const ForwardedOrder& order) { return surroundings_.now() >= order.until; };
+  for (auto late = std::ranges::find_if(orders_, is_late); late != orders_.end();
+       late = std::ranges::find_if(orders_, is_late)) {
+    end_order(late, ErrorCode::timed_out, no_answer_text(late->request.verb));
+  }
+}
+
+bool ManagedInstance::makes_room_for(ControlVerb verb) {
+  if (!operation_) return true;
+  if (!waits_for_single_cycle() || !contains(kBreakOff, verb)) return false;
+  host_.set_timer(std::nullopt);
+  finish(ErrorCode::wrong_state, fmt::format("broken off by '{}'", to_string(verb)));
+  look_again();
+  return true;
+}
+
+}  // namespace plchost
