@@ -265,7 +265,7 @@ class PLCHOST_CLIENT_API Client {
   /// ClientError: not_found: no such variable, or it declares none.
   std::vector<Variable> variables(const std::string& host, const std::string& instance,
                                   const std::vector<std::string>& patterns = {});
-  /// The same, with their values of one moment. ClientError: full: they are more than 1024, or some 200 kB.
+  /// The same, with their values of one moment. ClientError: full: more than 1024, or 96 KiB of them.
   Sample sample(const std::string& host, const std::string& instance,
                 const std::vector<std::string>& patterns);
   /// The variables of a host that are forced, with the values that they are forced to; of an array, each

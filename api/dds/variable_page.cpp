@@ -53,8 +53,9 @@ Result<void> is_whole(const VariableListing& page) {
   if (page.complete) return {};
   return failure(
       ErrorCode::full,
-      fmt::format("these are more variables than one sample holds ({} and some 200 kB): name fewer",
-                  kPageVariables));
+      fmt::format(
+          "these are more variables than one sample holds ({}, and 96 KiB of their values): name fewer",
+          kPageVariables));
 }
 
 VariablePageSample::VariablePageSample(VariableListing& listing) {

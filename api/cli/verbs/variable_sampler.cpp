@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "api/dds/page_sample.hpp"
 
@@ -25,6 +26,10 @@ Result<VariableListing> VariableSampler::sample(TimePoint until) {
   PLCHOST_TRY_ASSIGN(auto page, session_.client().value()->list_variables(
                                     host_, instance_, query_, std::min(session_.deadline(), until)));
   PLCHOST_TRY(is_whole(page));
+  if (page.variables.empty() && !query_.patterns.empty()) {
+    return failure(ErrorCode::not_found, fmt::format("no variable of '{}' is like {}", instance_,
+                                                     fmt::join(query_.patterns, ", ")));
+  }
   return page;
 }
 

@@ -103,11 +103,22 @@ std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
   return compare_all("area", running, next, compare_area);
 }
 
-std::vector<std::string> compare_variables(const CarriedByName& running, const CarriedByName& next) {
+std::vector<std::string> compare_variables(const CarriedByName& running, const CarriedByName& next,
+                                           const TypeOfVariable& running_type,
+                                           const TypeOfVariable& next_type) {
   std::vector<std::string> lines;
   for (const auto& [name, carried] : running) {
     const auto same = next.find(name);
     if (same == next.end()) continue;
+    if (carried.bytes == same->second.bytes && carried.layout == same->second.layout) continue;
+    // Size and layout are those of the compiler: the type says more to the engineer.
+    const std::string was = running_type(name);
+    const std::string is = next_type(name);
+    if (!was.empty() && !is.empty() && was != is) {
+      lines.push_back(
+          fmt::format("variable '{}': its type is {}, of the one that runs it is {}", name, is, was));
+      continue;
+    }
     Differences variables(lines, fmt::format("variables '{}'", name));
     variables.look("dwBytes", carried.bytes, same->second.bytes);
     variables.look("qwLayout", carried.layout, same->second.layout);

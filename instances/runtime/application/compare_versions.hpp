@@ -1,7 +1,9 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "instances/runtime/application/application_declaration.hpp"
@@ -18,8 +20,12 @@ namespace plchost {
 /// The same areas, in any order, with the tasks that use them.
 [[nodiscard]] std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
                                                      std::span<const DeclaredArea> next);
+/// The type of a variable that is seen from outside, as people know it: "INT"; empty: it is not seen.
+using TypeOfVariable = std::function<std::string(std::string_view name)>;
 /// Variables that both name. Others may come and go.
-[[nodiscard]] std::vector<std::string> compare_variables(const CarriedByName& running,
-                                                         const CarriedByName& next);
+[[nodiscard]] std::vector<std::string> compare_variables(
+    const CarriedByName& running, const CarriedByName& next,
+    const TypeOfVariable& running_type = [](std::string_view) { return std::string(); },
+    const TypeOfVariable& next_type = [](std::string_view) { return std::string(); });
 
 }  // namespace plchost

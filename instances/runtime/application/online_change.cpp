@@ -70,7 +70,21 @@ Result<void> OnlineChange::compare(const ApplicationDeclaration& declaration) co
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(lines)); };
   add(compare_tasks(running_.tasks(), next_.tasks()));
   add(compare_areas(host_.areas().declared(), declaration.areas));
-  add(compare_variables(host_.declaration().variables, declaration.variables));
+  const auto type_in = [](const auto& variables, const auto& symbol_of) {
+    return [&variables, symbol_of](std::string_view name) {
+      const auto found = std::ranges::find_if(variables, [&](const auto& variable) {
+        return same_variable_name(symbol_of(variable).name, name);
+      });
+      return found == std::ranges::end(variables) ? std::string() : type_text(symbol_of(*found));
+    };
+  };
+  const auto running = host_.variables().access().symbols();
+  const auto next = declaration.seen.variables();
+  add(compare_variables(
+      host_.declaration().variables, declaration.variables,
+      type_in(running, [](const VariableSymbol& symbol) -> const VariableSymbol& { return symbol; }),
+      type_in(next,
+              [](const DeclaredVariable& variable) -> const VariableSymbol& { return variable.symbol; })));
   if (lines.empty()) return {};
   return failure(ErrorCode::refused,
                  fmt::format("{} cannot take over online: {}; nothing is changed; load it without --online",

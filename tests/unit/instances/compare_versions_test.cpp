@@ -136,5 +136,16 @@ TEST(VariablesOfTwoVersions, MayComeAndGoButNotChangeTheirLayout) {
                           "variables 'other': qwLayout is 2, of the one that runs it is 1"));
 }
 
+TEST(VariablesOfTwoVersions, AreNamedWithTheirTypesWhereBothAreSeen) {
+  const CarriedByName running{{"MAIN.SPEED", {.bytes = 2, .layout = 1}}, {"MAIN.PART", {.bytes = 8}}};
+  const CarriedByName next{{"MAIN.SPEED", {.bytes = 4, .layout = 2}}, {"MAIN.PART", {.bytes = 9}}};
+  const auto type = [](std::string_view of_speed) {
+    return [of_speed](std::string_view name) { return std::string(name == "MAIN.SPEED" ? of_speed : ""); };
+  };
+  EXPECT_THAT(compare_variables(running, next, type("INT"), type("DINT")),
+              ElementsAre("variables 'MAIN.PART': dwBytes is 9, of the one that runs it is 8",
+                          "variable 'MAIN.SPEED': its type is DINT, of the one that runs it is INT"));
+}
+
 }  // namespace
 }  // namespace plchost
