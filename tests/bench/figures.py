@@ -12,9 +12,9 @@ import statistics
 import sys
 
 UNITS = [("_us_per_cycle", "us"), ("_us_per_activation", "us"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"),
-         ("_gb_s", "GB/s"), ("_mib", "MiB"), ("_per_second", "per second"), ("_per_million", "per million"), ("_per_cycle", "per cycle"),
+         ("gb_s", "GB/s"), ("_mib", "MiB"), ("_per_second", "per second"), ("_per_million", "per million"), ("_per_cycle", "per cycle"),
          ("_per_stall", "per stall"), ("_percent", "%"), ("_ppb", "ppb"), ("share_of_core", "share of a core"),
-         ("load", "share of a core")]
+         ("load", "share of a core"), ("share", "share of a core")]
 # The unit of the last ones stands before a number of tasks or objects.
 INFIXES = [("_us_per_activation_", "us"), ("_ns_per_", "ns"), ("_us_", "us")]
 
@@ -84,9 +84,17 @@ def others_in_short(rows):
 
 def conditions(rows):
     """Of the run: the machine, the rounds, and what else it did."""
-    first = rows[0]["conditions"]
+    machines = {}
+    for row in rows:
+        made = row["conditions"]
+        parts = machines.setdefault((made["cores"], made["processor"], made["kernel"]), [])
+        if (part := row["name"].split("/")[0]) not in parts:
+            parts.append(part)
+    lines = [f"* Machine: {cores} cores, {processor}, kernel {kernel}." for cores, processor, kernel in machines]
+    if len(machines) > 1:  # parts were measured anew elsewhere; their floors are of the same machine
+        lines = [f"{line[:-1]}: {', '.join(f'`{part}`' for part in parts)}." for line, parts in zip(lines, machines.values())]
     rounds = spread([row["rounds"] for row in rows])
-    return [f"* Machine: {first['cores']} cores, {first['processor']}, kernel {first['kernel']}.",
+    return [*lines,
             f"* {rounds} rounds of {spread(of_conditions(rows, 'each_s'))} s of each thing. A spread is the least and the most of "
             "the rounds.", *others(rows), ""]
 

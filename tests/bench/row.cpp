@@ -200,9 +200,13 @@ void take_medians(Row& row) {
   };
   for (auto& [key, value] : row.extra)
     value = over([&](const Round& round) { return value_of(round.extra, key); });
+  // A figure and its bound belong together: of the rounds that have both.
   for (std::size_t i = 0; i < row.targets.size(); ++i) {
-    row.targets[i].measured = over([&](const Round& round) { return round.targets[i].measured; });
-    row.targets[i].bound = over([&](const Round& round) { return round.targets[i].bound; });
+    const auto if_decided = [i](const Round& round, double Target::* figure) {
+      return round.targets[i].decided() ? round.targets[i].*figure : kNotMeasured;
+    };
+    row.targets[i].measured = over([&](const Round& round) { return if_decided(round, &Target::measured); });
+    row.targets[i].bound = over([&](const Round& round) { return if_decided(round, &Target::bound); });
   }
 }
 

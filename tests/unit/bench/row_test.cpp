@@ -104,6 +104,16 @@ std::vector<Row> rounds(const std::vector<double>& measured) {
   return all;
 }
 
+TEST(Rounds, ThatDecideNothingHaveNoShareInTheFiguresOfATarget) {
+  std::vector<Row> sut;
+  for (const auto& [measured, bound] :
+       {std::pair(kNotMeasured, 0.0), std::pair(3.0, 5.5), std::pair(kNotMeasured, 0.0)})
+    add_round(sut, {{.name = "part/who", .targets = {{"lost cycles", "cycles", measured, bound}}}});
+  EXPECT_EQ(sut[0].targets[0].measured, 3);
+  EXPECT_EQ(sut[0].targets[0].bound, 5.5);
+  EXPECT_EQ(verdict_of(sut[0], 0).text(), "met");
+}
+
 TEST(Rounds, AreOneRowWithAllSamplesAndTheMedianOfTheRest) {
   std::vector<Row> sut;
   add_round(sut, {round_of(3, 1000), {.name = "part/other"}});
