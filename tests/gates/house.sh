@@ -50,6 +50,11 @@ if [ -d instances/runtime/abi ]; then
   exported=$(sed -nE 's/^  ([A-Za-z_]+);$/\1/p' "$symbols" | paste -sd'|')
   git grep -nE "^[A-Za-z_].*[ *]($exported)\(" -- 'instances/runtime/*.cpp' ':!instances/runtime/abi' &&
     fault "the lines above define functions of plc_app.h outside of instances/runtime/abi" || true
+  # Rooms below abi/ use none of these names, where no include tells it either, unless debug/ has the variable. Texts may.
+  own=$(git grep -hoE '^unsigned int plc_debug[a-z_]+' -- instances/runtime/debug | sed 's,.* ,,' || true)
+  git grep -nwE "$exported" -- 'instances/runtime/*/*.[ch]pp' ':!instances/runtime/'{abi,instance,trial} | sed -E 's,"[^"]*"|//.*,,g' |
+    grep -wE "$exported" | grep -v "^instances/runtime/debug/.*${own:-no name}" &&
+    fault "the lines above use what abi/ has, from a room below it" || true
 fi
 # A scheduler and a kind of task are named in one table, and in their own file.
 registry=schedulers/policies/registry.hpp

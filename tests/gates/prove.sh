@@ -119,6 +119,10 @@ mkdir -p "$plot/tree/instances/runtime/"{abi,tasks} && printf '{\n  plc_call;\n}
 echo 'void* plc_call(int x) {}' | tee "$plot/tree/instances/runtime/abi/calls.cpp" >"$plot/tree/instances/runtime/tasks/table.cpp" && commit_tree
 must_be_red "house: function of plc_app.h" "instances/runtime/tasks/table.cpp:1:void* plc_call(int x) {}" "$gates/house.sh" "$plot/tree"
 new_tree
+mkdir -p "$plot/tree/instances/runtime/"{abi,debug} && printf '{\n  plc_call;\n};\n' >"$plot/tree/instances/runtime/exported_symbols.txt"
+printf '  plc_call(1);\n' >"$plot/tree/instances/runtime/debug/service.cpp" && commit_tree
+must_be_red "house: use of abi/ from below" "instances/runtime/debug/service.cpp:1:  plc_call(1);" "$gates/house.sh" "$plot/tree"
+new_tree
 mkdir -p "$plot/tree/instances/runtime/abi" && touch "$plot/tree/instances/runtime/"{exported_symbols.txt,abi/calls.cpp} && commit_tree
 must_be_red "house: empty exported_symbols.txt" "exported_symbols.txt: it does not list the functions of plc_app.h" "$gates/house.sh" "$plot/tree"
 new_tree

@@ -10,8 +10,6 @@
 using plchost::ApplicationHost;
 using plchost::DebugTask;
 
-unsigned int plc_debug_armed = 0;
-
 namespace {
 
 constinit thread_local Plc_Frame* top_frame = nullptr;

@@ -8,12 +8,16 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "instances/plc_debug.h"
 #include "instances/runtime/debug/debug_answer.hpp"
 #include "instances/runtime/debug/debug_words.hpp"
 #include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/log/log.hpp"
+
+// Each statement of a debug build reads it, and the debugger alone writes it: so it is no function of abi/.
+unsigned int plc_debug_armed = 0;
 
 namespace plchost {
 
