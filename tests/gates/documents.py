@@ -14,6 +14,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 * Each name `Class::function` is one of the code.
 * Each text of a message in manager/troubleshooting.md is a part of one in the code.
 * Each file that a document names with its folder, as `folder/file.cpp`, is there, and each unit of a `systemctl` command.
+* Each room of runtime/ in the drawing of instances/README.md is a text of instances/rooms.svg.
 * Each command in the tables of api/plcctl.md is one of the generated table.
 """
 
@@ -363,6 +364,16 @@ def file_faults(root, texts):
                     yield f"{page}:{number}: no unit of systemd is called {unit}"
 
 
+def room_faults(root, texts):
+    """instances/rooms.svg has each room that the drawing of instances/README.md has."""
+    drawn = re.search(r"^```layers\n(.*?)^```", texts["instances/README.md"], re.MULTILINE | re.DOTALL)
+    rooms = set(re.findall(r"\bruntime/(\w+/)", drawn[1])) if drawn else set()
+    boxes = set(re.findall(r">([^<]*)</text>", (root / "instances/rooms.svg").read_text(encoding="utf-8")))
+    yield from (f"instances/rooms.svg: the room {room} of instances/README.md is missing" for room in sorted(rooms - boxes))
+    if not rooms:
+        yield "instances/README.md: its drawing has no room of runtime/"
+
+
 def sources_of(root, *more):
     return [file for folder in ("api", "instances", "manager", "schedulers", "shm", *more) for file in (root / folder).rglob("*.[ch]pp")]
 
@@ -404,6 +415,7 @@ def main():
         faults += command_faults(documents.texts)
         faults += walk_faults(documents.root, documents.texts)
         faults += file_faults(documents.root, documents.texts)
+        faults += room_faults(documents.root, documents.texts)
         faults += name_faults(documents.root, documents.texts)
         faults += message_faults(documents.root, documents.texts)
     except ValueError as wrong:

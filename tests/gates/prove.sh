@@ -291,6 +291,7 @@ plant_in_documents "documents: key that is read and has no row" "is read outside
 plant_in_documents "documents: another meaning of a key" "[host] pool_objects has another meaning than in the code" manager/configuration.md 's,room in the pool,room in pools,'
 plant_in_documents "documents: message that is gone" "no message has 'needs SCHED_FIFO prio '" manager/troubleshooting.md 's,`needs SCHED_FIFO priority`,`needs SCHED_FIFO prio `,'
 plant_in_documents "documents: file that is gone" "there is no file schedulers/register.hpp" schedulers/README.md 's,`schedulers/policies/registry.hpp`,`schedulers/register.hpp`,'
+plant_in_documents "documents: room without a box" "rooms.svg: the room debug/ of instances/README.md is missing" instances/rooms.svg '/>debug\/</d'
 plant_in_documents "documents: unknown unit" "no unit of systemd is called plchost" manager/troubleshooting.md 's,systemctl status plchostd,systemctl status plchost,'
 plant_in_documents "documents: function that is gone" "the code has no TaskSet::switch_planted" schedulers/mechanisms.md 's,TaskSet::switch_to,TaskSet::switch_planted,'
 plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
