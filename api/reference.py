@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the operations of control.idl from shm/base/operations.def, and the reference in reference.md from control.idl;
+"""Makes the operations of control.idl from shm/operations/operations.def, and the reference in reference.md from control.idl;
 holds control.idl to its own rules.
 
   reference.py --write               writes the operations into control.idl, and the reference into reference.md
@@ -157,7 +157,7 @@ def main():
     idl, page = options.root / "control.idl", options.root / "reference.md"
     try:
         if not options.compatible:
-            operations = operations_of(options.root.parent / "shm/base/operations.def")
+            operations = operations_of(options.root.parent / "shm/operations/operations.def")
             found = bring_up_to_date(idl, with_operations(idl.read_text(), operations), options.write)
         contract = parse(idl)
         if options.compatible:

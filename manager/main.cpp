@@ -19,8 +19,8 @@
 #include "manager/store/wish_writer.hpp"
 #include "manager/surroundings.hpp"
 #include "manager/system/child_process.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {

@@ -34,9 +34,9 @@
 #include "api/dds/domain.hpp"
 #include "api/dds/object_query.hpp"
 #include "api/dds/topics.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

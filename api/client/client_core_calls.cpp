@@ -9,7 +9,7 @@
 #include "api/client/client_core.hpp"
 #include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

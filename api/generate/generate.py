@@ -104,7 +104,7 @@ def status_topics(contract):
 
 def contract_operations(contract):
     lines = [HEAD + "#include <array>\n#include <cstdint>\n#include <string_view>\n", "namespace plchost {\n"]
-    lines += ["/// An operation as the contract has it; shm/base/operations.hpp is what the programs go by.", "struct ContractOperation {"]
+    lines += ["/// An operation as the contract has it; shm/operations/operations.hpp is what the programs go by.", "struct ContractOperation {"]
     lines += ["  std::string_view name;  ///< \"reset cold\"", "  std::int32_t number;", "  std::string_view role;  ///< of its topic: \"eng\"", "  bool names_instance;", "};\n"]
     lines.append("inline constexpr std::array kContractOperations{")
     for constant in contract.constants:

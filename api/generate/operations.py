@@ -1,4 +1,4 @@
-"""The operations of control.idl, made from the table of operations, shm/base/operations.def."""
+"""The operations of control.idl, made from the table of operations, shm/operations/operations.def."""
 
 import dataclasses
 import re

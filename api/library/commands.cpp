@@ -11,7 +11,7 @@
 #include "api/library/convert.hpp"
 #include "api/library/worker.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

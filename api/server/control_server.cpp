@@ -23,9 +23,9 @@
 #include "api/dds/told_keys.h"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {

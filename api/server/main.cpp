@@ -8,7 +8,7 @@
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/heap_trim.hpp"
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 #include "shm/process/end_with_parent.hpp"
 

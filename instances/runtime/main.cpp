@@ -16,9 +16,9 @@
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/trial/trial.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 #include "shm/process/end_with_parent.hpp"
 

@@ -7,8 +7,8 @@
 #include "manager/config/load_config.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/log/log.hpp"
+#include "shm/operations/operations.hpp"
 #include "shm/toml/section_reader.hpp"
 
 namespace plchost {

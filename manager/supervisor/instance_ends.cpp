@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/base/transient.hpp"
+#include "shm/operations/operations.hpp"
 #include "shm/process/dynamic_loader.hpp"
 
 namespace plchost {

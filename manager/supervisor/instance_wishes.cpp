@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

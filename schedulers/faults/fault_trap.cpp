@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 #include "schedulers/faults/processor_guard.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
+#include "shm/guard/memory_guard.hpp"
 
 namespace plchost {
 

@@ -6,7 +6,7 @@
 #include "schedulers/clock/clock.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "shm/base/futex.hpp"
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 
 namespace plchost {
 

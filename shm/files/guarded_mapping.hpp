@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 
 namespace plchost {
 

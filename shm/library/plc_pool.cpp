@@ -7,7 +7,7 @@
 #include <string>
 
 #include "shm/base/counting_semaphore.hpp"
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/library/pool_result.hpp"
 #include "shm/pool/object_pool.hpp"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

@@ -156,7 +156,7 @@ def kind_of_task(scratch):
 
 
 def command(scratch):
-    scratch.plant("shm/base/operations.def", "// Only the manager asks for these.", PLANTS["operation"], before=True)
+    scratch.plant("shm/operations/operations.def", "// Only the manager asks for these.", PLANTS["operation"], before=True)
     scratch.plant("instances/runtime/instance/instance_control.cpp", "static constexpr std::array kOwn = {", PLANTS["function of the operation"])
     yield
     scratch.must_be_red("control.idl is not up to date", lambda: scratch.contract("--check"))

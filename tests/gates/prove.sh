@@ -51,6 +51,7 @@ must_not_include() {
   rm "$plot/tree/$1"
 }
 must_not_include shm/base/planted.hpp shm/files/lock_file.hpp "shm/base/ may not include shm/files/"
+must_not_include shm/base/planted.hpp shm/operations/operations.hpp "shm/base/ may not include shm/operations/"
 must_not_include shm/pool/planted.cpp shm/pages/host_page.hpp "shm/pool/ may not include shm/pages/"
 must_not_include schedulers/tick/planted.hpp schedulers/task_set.hpp "schedulers/tick/ may not include schedulers/"
 must_not_include schedulers/planted.hpp shm/pool/object_pool.hpp "schedulers/ may not include shm/pool/"
@@ -160,11 +161,11 @@ must_be_red "house: name of a test's own making" "the lines above make names tha
 # plant_in_contract NAME DIAGNOSTIC EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {
   new_tree
-  mkdir -p "$plot/tree/shm/base"
-  cp shm/base/operations.def "$plot/tree/shm/base/"
+  mkdir -p "$plot/tree/shm/operations"
+  cp shm/operations/operations.def "$plot/tree/shm/operations/"
   cp api/control.idl api/reference.md "$plot/tree/api/"
-  sed -i -E "$3" "$plot/tree/api/control.idl" "$plot/tree/shm/base/operations.def"
-  cmp -s api/control.idl "$plot/tree/api/control.idl" && cmp -s shm/base/operations.def "$plot/tree/shm/base/operations.def" &&
+  sed -i -E "$3" "$plot/tree/api/control.idl" "$plot/tree/shm/operations/operations.def"
+  cmp -s api/control.idl "$plot/tree/api/control.idl" && cmp -s shm/operations/operations.def "$plot/tree/shm/operations/operations.def" &&
     { echo "nothing was planted for '$1'"; failed=1; }
   [ "${4:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write >/dev/null || true
   must_be_red "$1" "$2" "$gates/contract.sh" "$plot/tree"

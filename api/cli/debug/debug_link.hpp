@@ -11,8 +11,8 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/dds/variable_page.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

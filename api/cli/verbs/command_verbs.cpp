@@ -9,7 +9,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/verbs/application_verbs.hpp"
 #include "api/cli/verbs/host_commands.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

@@ -10,7 +10,7 @@
 #include "api/dds/object_query.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

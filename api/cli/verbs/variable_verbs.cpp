@@ -16,7 +16,7 @@
 #include "api/cli/verbs/variable_sampler.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

@@ -11,7 +11,7 @@
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 #include "shm/pages/debug_page.hpp"
 
 namespace plchost {

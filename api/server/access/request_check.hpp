@@ -9,7 +9,7 @@
 
 #include "api/dds/topic_info.hpp"
 #include "api/security/role.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 #include "shm/sockets/control_message.hpp"
 
 namespace plchost {

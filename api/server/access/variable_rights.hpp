@@ -3,8 +3,8 @@
 #include "api/dds/guid.hpp"
 #include "api/security/role.hpp"
 #include "api/server/clients/access_guard.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

@@ -14,8 +14,8 @@
 
 #include "instances/io/modbus/config/load_modbus.hpp"
 #include "instances/io/modbus/modbus_process.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 #include "shm/log/log_levels.hpp"
 

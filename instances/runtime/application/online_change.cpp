@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/application/compare_versions.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

@@ -8,8 +8,8 @@
 
 #include "instances/runtime/instance/instance.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
 #include "shm/log/log.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 

@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include "shm/base/operations.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/operations/operations.hpp"
 #include "tests/integration/api/client_library.hpp"
 #include "tests/integration/api/running_node.hpp"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "api/server/access/request_check.hpp"
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 namespace {

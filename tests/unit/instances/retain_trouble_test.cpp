@@ -13,8 +13,8 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/memory/retain_keeper.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "tests/unit/instances/retain_fixture.hpp"
 
 namespace plchost {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "tests/unit/manager/wish_store_fixture.hpp"
 
 namespace plchost {

@@ -9,7 +9,7 @@
 
 #include <gmock/gmock.h>
 
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "tests/support/interrupted_write.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 

@@ -8,7 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/result.hpp"
+#include "shm/guard/memory_guard.hpp"
 #include "shm/plc_process_image.h"
 
 namespace plchost::modbus {

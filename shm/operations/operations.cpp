@@ -1,4 +1,4 @@
-#include "shm/base/operations.hpp"
+#include "shm/operations/operations.hpp"
 
 #include <algorithm>
 
@@ -28,7 +28,7 @@ constexpr std::string_view kWords{kText.text.data(), kText.text.size() - 1};
 constexpr std::array kOperations = {
 #define OPERATION(word, number, meaning, ...) \
   Operation{.verb = ControlVerb::word, .name = kWords<#word> __VA_OPT__(, ) __VA_ARGS__},
-#include "shm/base/operations.def"
+#include "shm/operations/operations.def"
 #undef OPERATION
 };
 

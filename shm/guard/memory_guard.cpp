@@ -1,4 +1,4 @@
-#include "shm/base/memory_guard.hpp"
+#include "shm/guard/memory_guard.hpp"
 
 #include <algorithm>
 #include <mutex>

@@ -13,7 +13,7 @@ namespace plchost {
 /// api/control.idl; the others are between the manager and an instance only.
 enum class ControlVerb : std::uint8_t {
 #define OPERATION(verb, number, ...) verb = number,
-#include "shm/base/operations.def"
+#include "shm/operations/operations.def"
 #undef OPERATION
 };
 
