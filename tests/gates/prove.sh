@@ -131,6 +131,9 @@ echo 'void* library = dlop''en(path, RTLD_NOW);' >"$plot/tree/api/library.cpp" &
 must_be_red "house: library without a cause" "the lines above do not tell a shortage from a wrong file: use open_library" "$gates/house.sh" "$plot/tree"
 
 new_tree
+echo 'if (page->magic != kOwnMagic) return wrong_page();' >"$plot/tree/api/own_page.cpp" && commit_tree
+must_be_red "house: another check of a page" "the lines above check or make a page" "$gates/house.sh" "$plot/tree"
+new_tree
 printf '// clang-format off\n// A table. clang-''format on\n' >"$plot/tree/shm/base/joined.hpp" && commit_tree
 must_be_red "house: joined comment" "shm/base/joined.hpp:2:// A table. clang-format on" "$gates/house.sh" "$plot/tree"
 new_tree
