@@ -31,6 +31,8 @@ struct EventCallback {
 
 /// An application's declaration of itself in its plc_app_init. It is collected here, checked as a whole, and
 /// then committed: at the first load as in an online change. Nothing of it holds before.
+/// Channels are no part of it: plc_channel_open() makes the instance a node at once, as its result and
+/// plc_node_address() tell plc_app_init. A refused version leaves that node, which tasks may use.
 struct ApplicationDeclaration {
   sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
   bool tasks_given_twice = false;

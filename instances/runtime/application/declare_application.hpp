@@ -53,7 +53,8 @@ struct LoadContext {
 /// Loads it, has it declare itself to the host, and applies the settings of its tasks. Checks the declaration
 /// as a whole: external events, tasks, uses of areas, and at a first load whether the areas can be placed.
 /// Another version of the application that runs is loaded beside that, and is gone again after an error,
-/// which is the first thing that is wrong. Changes nothing else. Set-up.
+/// which is the first thing that is wrong. Changes nothing else, but that the first channel makes the
+/// instance a node at once: it stays one after an error. Set-up.
 [[nodiscard]] Result<DeclaredApplication> declare_application(const std::string& path,
                                                               const LoadContext& context);
 
