@@ -13,7 +13,7 @@
 
 #include "instances/runtime/instance/instance.hpp"
 #include "instances/runtime/memory/retain_keeper.hpp"
-#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/trial/trial.hpp"
 #include "shm/base/system_call.hpp"

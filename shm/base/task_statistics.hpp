@@ -77,6 +77,9 @@ struct TaskCounters {
 /// The histograms of a task: where the buckets of each lie in its memory.
 enum class TaskHistogram : std::uint8_t { latency, execution, jitter_negative, jitter_positive };
 inline constexpr std::size_t kTaskHistograms = 4;
+/// Up to so many tasks have histograms of 3 significant digits (352 KiB a task), more have 2 (50 KiB), unless
+/// the settings say otherwise.
+inline constexpr std::uint32_t kMaxFineTasks = 64;
 [[nodiscard]] constexpr std::size_t task_bucket_count(HistogramShape shape) noexcept {
   return kTaskHistograms * shape.bucket_count();
 }

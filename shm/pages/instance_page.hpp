@@ -90,9 +90,6 @@ struct TaskSlot {
 };
 
 inline constexpr std::uint32_t kMaxTasks = 1024;
-/// Up to so many tasks have histograms of 3 significant digits (352 KiB a task), more have 2 (50 KiB), unless
-/// the settings say otherwise.
-inline constexpr std::uint32_t kMaxFineTasks = 64;
 
 struct InstancePageLayout {
   std::uint64_t magic = 0;  ///< written last

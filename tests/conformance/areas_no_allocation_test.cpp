@@ -8,6 +8,7 @@
 
 #include "instances/runtime/memory/areas.hpp"
 #include "instances/runtime/memory/retain_group.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 #include "shm/files/pool_files.hpp"
 #include "tests/conformance/malloc_count.hpp"
 #include "tests/support/own_name.hpp"

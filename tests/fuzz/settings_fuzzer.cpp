@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto settings = plchost::parse_settings({reinterpret_cast<const char*>(data), size}, "f");

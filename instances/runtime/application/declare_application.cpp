@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/application/elf_check.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 #include "instances/runtime/tasks/registered_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
 #include "shm/base/transient.hpp"

@@ -12,6 +12,7 @@
 #include "instances/runtime/application/components.hpp"
 #include "instances/runtime/settings/device_description.hpp"
 #include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/settings_source.hpp"
 
 namespace plchost {
 

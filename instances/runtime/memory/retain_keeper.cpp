@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {

@@ -10,12 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "instances/runtime/settings/settings_source.hpp"
 #include "schedulers/settings/scheduler_settings.hpp"
 #include "schedulers/settings/task_options.hpp"
-#include "shm/base/result.hpp"
+#include "shm/base/task_statistics.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 
@@ -148,14 +146,5 @@ inline constexpr std::uint64_t kAreaAlignment = 8;
 /// Files that refer to each other: so many behind the first, and in all.
 inline constexpr std::size_t kMaxReferenceDepth = 8;
 inline constexpr std::size_t kMaxSettingsFiles = 64;
-
-/// `file` is how errors call it: "FILE:LINE: the fault, and the allowed values". Follows no references.
-[[nodiscard]] Result<InstanceSettings> parse_settings(std::string_view text, std::string_view file);
-
-/// With the files of its [CmpSettings] FileReference.N. Relative paths in it are made absolute. not_found: no
-/// such file. Set-up.
-[[nodiscard]] Result<InstanceSettings> read_settings(const std::string& file);
-/// The same from `source`, or read through it.
-[[nodiscard]] Result<InstanceSettings> read_settings(const std::string& file, SettingsSource& source);
 
 }  // namespace plchost

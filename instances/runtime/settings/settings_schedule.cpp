@@ -3,6 +3,7 @@
 
 #include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "instances/runtime/settings/read_settings.hpp"
+
 namespace plchost {
 namespace {
 

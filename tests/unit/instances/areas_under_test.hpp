@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/memory/areas.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/pages/outputs_page.hpp"
 #include "tests/support/own_name.hpp"

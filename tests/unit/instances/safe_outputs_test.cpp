@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/memory/area_plan.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/pages/outputs_page.hpp"

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/application/declare_application.hpp"
-#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 
 namespace plchost {
 namespace {

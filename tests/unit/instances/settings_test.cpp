@@ -1,5 +1,3 @@
-#include "instances/runtime/settings/settings.hpp"
-
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -8,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "instances/runtime/settings/read_settings.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "shm/block_driver/node_directory.hpp"

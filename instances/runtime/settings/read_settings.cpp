@@ -1,4 +1,4 @@
-#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/read_settings.hpp"
 
 #include <algorithm>
 #include <filesystem>
