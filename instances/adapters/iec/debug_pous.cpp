@@ -1,44 +1,15 @@
 #include "instances/adapters/iec/debug_pous.hpp"
 
 #include <algorithm>
-#include <array>
 #include <ranges>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <header_macros.hpp>
 
 namespace plchost::iec {
 
 namespace {
-
-/// Macros of plc_app.h that a program may have as names of its own, or the library of a compiler.
-constexpr std::array<std::string_view, 27> kMacros{"CDECL",
-                                                   "RTS_INVALID_HANDLE",
-                                                   "ERR_OK",
-                                                   "ERR_FAILED",
-                                                   "ERR_PARAMETER",
-                                                   "ERR_NOTINITIALIZED",
-                                                   "ERR_NOBUFFER",
-                                                   "ERR_PENDING",
-                                                   "ERR_BUFFERSIZE",
-                                                   "ERR_NO_OBJECT",
-                                                   "ERR_NOMEMORY",
-                                                   "ERR_DUPLICATE",
-                                                   "ERR_NO_TASK",
-                                                   "Cyclic",
-                                                   "Event",
-                                                   "External",
-                                                   "Freewheeling",
-                                                   "EVT_ExternalEventTaskCreateDone",
-                                                   "EVT_PrepareExternalEventTaskDelete",
-                                                   "EVT_PrepareStart",
-                                                   "CH_INIT",
-                                                   "CH_INIT2",
-                                                   "CH_INIT3",
-                                                   "CH_EXIT3",
-                                                   "CH_EXIT2",
-                                                   "CH_EXIT",
-                                                   "CH_TRIAL"};
 
 std::string in_quotes(std::string_view text) {
   std::string quoted = "\"";
@@ -74,7 +45,7 @@ std::string declared_locals(std::size_t pou, std::span<const DebugLocal> locals)
 
 std::string debug_header(std::span<const DebugPou> pous) {
   std::string text = "/* Written by plcctl build application. */\n#include \"plc_debug.h\"\n";
-  for (const std::string_view macro : kMacros) text += fmt::format("#undef {}\n", macro);
+  for (const std::string_view macro : kHeaderMacros) text += fmt::format("#undef {}\n", macro);
   for (std::size_t i = 0; i < pous.size(); ++i) {
     const std::vector<unsigned> lines = ascending(pous[i].lines);
     text += fmt::format(
