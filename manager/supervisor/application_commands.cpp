@@ -6,6 +6,7 @@
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 
@@ -92,7 +93,7 @@ void ManagedInstance::begin_change() {
   const auto number = send_limited(ControlVerb::change_application, operation_->request);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
-  host_.set_timer(after(limit_of(ControlVerb::change_application)));
+  host_.set_timer(after(operation_of(ControlVerb::change_application).limit));
 }
 
 // The loaded application has not come up: the one before is started instead.

@@ -233,7 +233,7 @@ void ManagedInstance::forward() {
   const auto number = send_limited(operation_->request.verb, operation_->request);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
-  host_.set_timer(after(limit_of(operation_->request.verb)));
+  host_.set_timer(after(operation_of(operation_->request.verb).limit));
   if (operation_->request.verb == ControlVerb::stop) {
     set_state(Phase::up, InstanceState::stopping, problem_when_up());
   }
@@ -283,12 +283,6 @@ void ManagedInstance::look_again() {
   if (status_.state == InstanceState::stopping && !host_.runtime()) {
     set_state(Phase::up, InstanceState::running, problem_when_up());
   }
-}
-
-Duration ManagedInstance::limit_of(ControlVerb verb) noexcept {
-  if (verb == ControlVerb::stop) return kStopLimit;
-  if (verb == ControlVerb::change_application) return kChangeLimit;
-  return verb == ControlVerb::single_cycle ? kSingleCycleLimit : kCommandLimit;
 }
 
 void ManagedInstance::finish(ErrorCode code, const std::string& text) {

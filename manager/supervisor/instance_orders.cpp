@@ -8,6 +8,7 @@
 
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/log/log.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 
@@ -42,7 +43,7 @@ void ManagedInstance::begin_order(ControlRequest request, ControlReplyFunction r
   };
   const auto number = send_limited(request.verb, request);
   if (!number) return refuse(number.error().code, number.error().describe());
-  const TimePoint until = after(limit_of(request.verb));
+  const TimePoint until = after(operation_of(request.verb).limit);
   orders_.push_back(
       {.request = std::move(request), .reply = std::move(reply), .number = *number, .until = until});
 }

@@ -9,6 +9,7 @@
 #include "shm/base/time.hpp"
 #include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 
@@ -339,12 +340,12 @@ std::string ManagedInstance::core_problem() {
 
 std::string ManagedInstance::no_answer_text(ControlVerb verb) const {
   return fmt::format("'{}' did not answer within {} s{}{}", config_.name,
-                     std::chrono::duration_cast<std::chrono::seconds>(limit_of(verb)).count(),
+                     std::chrono::duration_cast<std::chrono::seconds>(operation_of(verb).limit).count(),
                      starved_by_.empty() ? "" : ": ", starved_by_);
 }
 
 Result<std::uint64_t> ManagedInstance::send_limited(ControlVerb verb, const ControlRequest& request) {
-  const std::int64_t ours = boot_time_ns() + limit_of(verb).count();
+  const std::int64_t ours = boot_time_ns() + operation_of(verb).limit.count();
   return send(verb, request.argument, request.limit_ns == 0 ? ours : std::min(ours, request.limit_ns));
 }
 

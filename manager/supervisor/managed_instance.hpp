@@ -54,7 +54,7 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //   the problem text names them until its heartbeats resume. The state stays, and commands wait for their
 //   limits. Such time extends the limit of the set-up.
 // * Nothing is begun after the time limit of its command, also if it waited for the process or for the trial of a file
-//   meanwhile. The process gets the lesser of that limit and limit_of() from now.
+//   meanwhile. The process gets the lesser of that limit and that of the operation from now.
 //
 // * Orders are commands of the debugger and for variables. The process carries them out when no task is in a cycle, up to
 //   2 s later. No other command waits for them, and they go on beside a stop and beside each other.
@@ -244,7 +244,6 @@ class ManagedInstance : public InstanceEvents {
   void finish_forwarded(const ControlReply& reply);
   [[nodiscard]] Result<void> check_argument(ControlRequest& request) const;
   [[nodiscard]] Result<void> check_path(ControlRequest& request) const;
-  [[nodiscard]] static Duration limit_of(ControlVerb verb) noexcept;
   [[nodiscard]] bool idle_phase() const noexcept {
     return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;
   }
@@ -399,17 +398,12 @@ class ManagedInstance : public InstanceEvents {
   InstanceStatus status_;
 };
 
-/// Limits of the phases and of a command.
+/// Limits of the phases; those of commands are in the rows of shm/operations/operations.def.
 inline constexpr Duration kSetupLimit = std::chrono::seconds(30);
 inline constexpr Duration kAdoptLimit = std::chrono::seconds(5);
 /// Longer than a stop may take: 10 s for tasks that drive outputs, 25 s for the others.
 inline constexpr Duration kShutdownLimit = std::chrono::seconds(38);
-inline constexpr Duration kStopLimit = std::chrono::seconds(38);
-inline constexpr Duration kSingleCycleLimit = std::chrono::seconds(28);  ///< 25 s for all tasks
 inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
-inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
-/// 8 s for the set-up of the new version, 6 s for a moment in which no task is in a cycle.
-inline constexpr Duration kChangeLimit = std::chrono::seconds(18);
 /// The process's page is believed only this long after its own answer: it is written periodically.
 inline constexpr Duration kPageLag = std::chrono::seconds(1);
 

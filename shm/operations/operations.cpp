@@ -11,6 +11,7 @@ namespace {
 using Place = OperationPlace;
 using Argument = OperationArgument;
 using Right = OperationRight;
+using std::chrono::seconds;
 constexpr ApiRole kViewer = ApiRole::viewing;
 constexpr ApiRole kEngineer = ApiRole::engineering;
 
@@ -43,6 +44,10 @@ std::span<const Operation> operations() noexcept {
 const Operation& operation_of(ControlVerb verb) noexcept {
   const auto* const found = std::ranges::find(kOperations, verb, &Operation::verb);
   return found != kOperations.end() ? *found : kNone;
+}
+
+Duration least_wait(const Operation& operation) noexcept {
+  return operation.takes_long || operation.limit > kCommandLimit ? kLongCommand : Duration::zero();
 }
 
 const Operation* find_operation(std::int32_t number) noexcept {

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -48,6 +51,12 @@ enum class OperationArgument : std::uint8_t {
 /// The options of a request beside its argument.
 enum class OperationOptions : std::uint8_t { none, loading, download };
 
+/// The time of an instance's process for an operation whose row has no other.
+inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
+/// How long a client waits for an operation that takes longer. A stop may take 35 s, and a fresh process
+/// comes after one. Longer than the server waits for the manager, so that its answer is heard.
+inline constexpr Duration kLongCommand = std::chrono::seconds(80);
+
 /// A row of the table of operations. Checks, roles, limits, words of plcctl with their help and completion,
 /// and functions of the client library come from it.
 struct Operation {
@@ -60,7 +69,10 @@ struct Operation {
   OperationOptions options = OperationOptions::none;
   bool names_instance = true;
   bool only_reads = false;  ///< changes nothing, so the audit log does not have it
-  bool takes_long = false;  ///< up to 35 s, because it waits for cycles or for a fresh process
+  /// The time of an instance's process to carry it out, from when the manager hands it on.
+  Duration limit = kCommandLimit;
+  /// It waits for cycles or for a fresh process, beside the time of its limit.
+  bool takes_long = false;
   /// "verb noun" of plcctl; empty: plcctl has words of its own for it, or none.
   const char* verb_word = "";
   const char* noun_word = "";
@@ -73,6 +85,8 @@ struct Operation {
 [[nodiscard]] std::span<const Operation> operations() noexcept;
 /// All verbs have one.
 [[nodiscard]] const Operation& operation_of(ControlVerb verb) noexcept;
+/// The least time that a client waits for the reply, unless its user says how long. Zero: as for any request.
+[[nodiscard]] Duration least_wait(const Operation& operation) noexcept;
 /// Of a number of control.idl, or of a name. Null: there is none, or only the manager asks for it.
 [[nodiscard]] const Operation* find_operation(std::int32_t number) noexcept;
 [[nodiscard]] const Operation* find_operation(std::string_view name) noexcept;

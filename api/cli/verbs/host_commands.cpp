@@ -16,9 +16,9 @@ namespace plchost {
 
 namespace {
 
-bool takes_long(std::int32_t operation) {
+Duration wait_for(std::int32_t operation) {
   const Operation* const known = find_operation(operation);
-  return known != nullptr && known->takes_long;
+  return known != nullptr ? least_wait(*known) : Duration::zero();
 }
 
 // A refusal does not name the instance that was meant.
@@ -75,8 +75,7 @@ namespace {
 
 int command_on(CliSession& session, const std::vector<std::string>& hosts, const ApiRequest& request,
                std::string_view done) {
-  const TimePoint deadline =
-      session.deadline(takes_long(request.operation) ? kLongCommand : Duration::zero());
+  const TimePoint deadline = session.deadline(wait_for(request.operation));
   return ask_hosts(
       session, hosts, request.instance,
       [&](ClientCore& core, const std::string& host) {

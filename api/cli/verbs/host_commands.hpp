@@ -8,10 +8,6 @@
 
 namespace plchost {
 
-/// A stop may take 35 s, and a fresh process comes after one. Longer than the server waits for the manager,
-/// so that its answer is heard.
-inline constexpr Duration kLongCommand = std::chrono::seconds(80);
-
 /// Sends a command to the hosts that are meant and says what became of it at each; the exit code.
 /// `done`: the word about the instance when it was done ("stopped").
 [[nodiscard]] int command(CliSession& session, const ApiRequest& request, std::string_view done = "done");

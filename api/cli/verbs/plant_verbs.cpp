@@ -11,6 +11,7 @@
 #include "api/cli/plant/plant_file.hpp"
 #include "api/cli/plant/plant_work.hpp"
 #include "shm/base/names.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 
@@ -19,9 +20,6 @@ namespace {
 /// Exit codes of `diff`, as those of diff(1).
 constexpr int kDiffers = 1;
 constexpr int kDiffFailed = 2;
-
-// As long as the longest command that it may have to give; see command_verbs.cpp.
-constexpr Duration kLongCommand = std::chrono::seconds(80);
 
 using Kind = PlantFinding::Result;
 

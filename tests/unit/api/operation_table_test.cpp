@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "api/server/access/request_check.hpp"
+#include "api/server/manager_link.hpp"
 #include "shm/operations/operations.hpp"
 
 namespace plchost {
@@ -52,6 +53,23 @@ TEST(OperationTable, OnlyWhatIsOfAHostOrReadsNamesNoInstance) {
     EXPECT_TRUE(operation.place == OperationPlace::host || operation.place == OperationPlace::server)
         << operation.name;
   }
+}
+
+TEST(OperationTable, HasTheTimeOfEachOperation) {
+  using std::chrono::seconds;
+  EXPECT_EQ(operation_of(ControlVerb::stop).limit, seconds(38));
+  EXPECT_EQ(operation_of(ControlVerb::single_cycle).limit, seconds(28));
+  EXPECT_EQ(operation_of(ControlVerb::change_application).limit, seconds(18));
+  EXPECT_EQ(operation_of(ControlVerb::set_scheduler).limit, seconds(10));
+}
+
+TEST(OperationTable, ClientsWaitUntilTheServerHasAnswered) {
+  EXPECT_GT(kLongCommand, ManagerLink::kCommandLimit);
+  for (const Operation& operation : operations())
+    EXPECT_LE(operation.limit, ManagerLink::kCommandLimit) << operation.name;
+  EXPECT_EQ(least_wait(operation_of(ControlVerb::stop)), kLongCommand);
+  EXPECT_EQ(least_wait(operation_of(ControlVerb::restart)), kLongCommand);
+  EXPECT_EQ(least_wait(operation_of(ControlVerb::start)), Duration::zero());
 }
 
 TEST(OperationTable, SaysWhatWasDone) {

@@ -213,10 +213,11 @@ TEST_F(SilentProcess, SaysWhyACommandIsNotAnsweredWhileOtherProgramsTakeItsCore)
   host_.use.ready = {{.id = sut().status().pid, .used = {}}};
   ask(ControlVerb::stop);
   EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop);
-  go_on_for(kStopLimit);
+  go_on_for(operation_of(ControlVerb::stop).limit);
   expire_timer();
   const auto reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::timed_out);
+  EXPECT_THAT(reply.text, HasSubstr("did not answer within 38 s"));
   EXPECT_THAT(reply.text, HasSubstr("program 'hog'"));
   EXPECT_TRUE(host_.signals.empty());
 }
