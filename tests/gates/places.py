@@ -119,6 +119,9 @@ class Scratch:
         """Makes what the build makes from the contract, but for the types in C."""
         self.run([sys.executable, self.root / "api/generate/generate.py", self.root / "api/control.idl", self.made])
 
+    def types_in_c(self):
+        self.run(["idlc", "-Wno-implicit-extensibility", self.root / "api/control.idl"], cwd=self.made)
+
     def contract(self, action):
         return self.run([sys.executable, self.root / "api/reference.py", action])
 
@@ -163,7 +166,8 @@ def command(scratch):
     scratch.documents()
     scratch.generate()
     scratch.check(PLANTS["operation is in the contract"])
-    scratch.compile("instances/runtime/instance/instance_control.cpp")
+    scratch.types_in_c()
+    scratch.compile("instances/runtime/instance/instance_control.cpp", "api/cli/verbs/command_verbs.cpp", "api/cli/verbs/host_commands.cpp")
 
 
 def status_topic(scratch):
@@ -171,7 +175,7 @@ def status_topic(scratch):
     scratch.plant("api/server/status/status_publisher.cpp", "  running_ = 0;\n", PLANTS["samples of the topic"])
     yield
     scratch.documents()
-    scratch.run(["idlc", "-Wno-implicit-extensibility", scratch.root / "api/control.idl"], cwd=scratch.made)
+    scratch.types_in_c()
     scratch.generate()
     scratch.check(PLANTS["topic has its parts"])
     scratch.compile("api/server/status/status_publisher.cpp")
