@@ -197,11 +197,11 @@ class TaskSet {
   [[nodiscard]] std::optional<Fault> take_fault();
   /// Of tasks of external events. Those that are stopped or in exception: posts since then are counted as
   /// lost. Those that run: one that sleeps although it was posted to is woken; its poster was ended in
-  /// between. To be called now and then.
+  /// between. To be called every 100 ms.
   void look_after_posts() noexcept;
   /// Finds threads of this process that take the processor from the thread that watches the tasks, where
   /// ProcessorGuard has not: they lose their real-time priority. The lines to log about those, and about
-  /// programs that keep tasks from the processor. To be called now and then.
+  /// programs that keep tasks from the processor. To be called every 100 ms.
   [[nodiscard]] std::vector<std::string> look_after_processor();
   /// The names of the tasks that are in exception, and so keep start() from it.
   [[nodiscard]] std::vector<std::string_view> tasks_in_exception() const;

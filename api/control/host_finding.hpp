@@ -14,7 +14,7 @@ namespace plchost {
 enum class FindingLevel : std::uint8_t {
   ok = 0,       ///< as it should be
   note = 1,     ///< could be better, or cannot be known
-  warning = 2,  ///< cycles will start late now and then
+  warning = 2,  ///< cycles will sometimes start late
   problem = 3,  ///< no hard time on this host as it is
 };
 [[nodiscard]] std::string_view to_string(FindingLevel level) noexcept;

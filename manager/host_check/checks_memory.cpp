@@ -76,8 +76,7 @@ HostFinding numa_balancing(const CheckedHost& host) {
       host,
       {.path = "/proc/sys/kernel/numa_balancing",
        .subject = "NUMA balancing",
-       .why =
-           "it takes pages away now and then to see who touches them: page faults in spite of locked memory",
+       .why = "it sometimes takes pages away to see who touches them: page faults in spite of locked memory",
        .advice = "sysctl -w kernel.numa_balancing=0",
        .on = FindingLevel::warning});
 }

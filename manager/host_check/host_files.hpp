@@ -20,7 +20,7 @@ class HostFiles {
   [[nodiscard]] Result<std::string> text(const std::string& path) const;
   /// corrupt: does not hold one whole number.
   [[nodiscard]] Result<std::int64_t> number(const std::string& path) const;
-  /// corrupt: not of the form "0-3,8". "(null)", as the kernel writes an empty set now and then, is one.
+  /// corrupt: not of the form "0-3,8". "(null)", as the kernel sometimes writes an empty set, is one.
   [[nodiscard]] Result<std::vector<int>> cores(const std::string& path) const;
   /// Of the form "ff,00000003".
   [[nodiscard]] Result<std::vector<int>> core_mask(const std::string& path) const;

@@ -45,7 +45,7 @@ class WishStore : public WishKeeper {
   void keep_events() override;
   void when_kept(Kept kept) override;
   [[nodiscard]] bool is_writing() const override { return writing_; }
-  /// To be called now and then: a part of the memory that another program has overwritten is written anew,
+  /// To be called once a second: a part of the memory that another program has overwritten is written anew,
   /// and logged.
   void look_after_memory();
   /// The end of the manager in order: nothing stays in memory that is on the disk.

@@ -118,7 +118,7 @@ class Task {
   /// Null: not an event task.
   [[nodiscard]] EventLatch* latch() noexcept { return state_->latch(); }
   /// External events: wakes the task if it may sleep although its event was posted, because the poster ended
-  /// before it woke anybody. Now and then. Control thread.
+  /// before it woke anybody. Called every 100 ms. Control thread.
   void rouse() noexcept;
   /// External events: counts the posts that were not run as lost. Control thread, while the task's thread
   /// rests.

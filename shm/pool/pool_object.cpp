@@ -13,7 +13,7 @@ constexpr Duration kLook = std::chrono::milliseconds(40);
 // A waiter without a mark is not woken, so it polls each millisecond.
 constexpr Duration kUnmarkedLook = std::chrono::milliseconds(1);
 
-// A waiter without a limit looks now and then whether the object is still there.
+// A waiter without a limit looks every 200 ms whether the object is still there.
 TimePoint next_look(TimePoint deadline) noexcept {
   constexpr Duration kInterval = std::chrono::milliseconds(200);
   return std::min(deadline, MonotonicClock::now() + kInterval);

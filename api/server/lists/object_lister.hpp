@@ -27,7 +27,7 @@ class ObjectLister {
     return page(query, MonotonicClock::now() + kPageTime);
   }
 
-  /// Gives the memory back that nobody asked for lately. To be called now and then.
+  /// Gives the memory back that nobody asked for lately. To be called every 10 ms.
   void forget_old(TimePoint now);
 
   static constexpr Duration kPageTime = std::chrono::milliseconds(5);

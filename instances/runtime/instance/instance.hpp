@@ -66,7 +66,7 @@ class Instance {
   static constexpr auto kHeartbeat = std::chrono::milliseconds(100);
 
   /// Goes on with a stop, a single cycle, an online change, or requests for variables that are under way.
-  /// Never waits. To be called now and then.
+  /// Never waits. To be called at each heartbeat and after each request.
   void advance();
   /// How soon advance() wants to be called; nothing: no need.
   [[nodiscard]] std::optional<Duration> wants_advance_in() const noexcept;

@@ -72,7 +72,7 @@ class SafeOutputs {
   /// them halts any more, and a cycle has ended then. Control thread, while each of those tasks stands still,
   /// and before it goes on.
   void halt(const std::function<bool(std::size_t task)>& is_halted) noexcept;
-  /// Now and then: gives a sign to terminals, and writes safe values again that a task may have written over.
+  /// Every 100 ms: gives a sign to terminals, and writes safe values again that a task may have written over.
   /// Control thread.
   void beat(const InCycle& in_cycle) noexcept;
 

@@ -75,7 +75,7 @@ class EventTable {
   void publish_bound(bool running);
   /// Tells posters that one of the tasks that are bound to the own event takes no more posts, the others do.
   void withdraw_task(std::string_view event);
-  /// Gets events of others that lost their place in the pool back. Now and then.
+  /// Gets events of others that lost their place in the pool back. Called every 100 ms.
   void refresh();
 
   /// Real-time: see SchedPostExternalEvent and CAL_SysEventSet.

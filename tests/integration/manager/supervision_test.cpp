@@ -220,7 +220,7 @@ TEST(Manager, NamesTheThreadThatTakesTheProcessorInTheSetUpAndFreesTheCore) {
   EXPECT_THAT(problem("line4"), HasSubstr("load application: the set-up has not returned for 25 s"));
 }
 
-// So that its control thread always has something to do: a thread that sleeps now and then gets the little
+// So that its control thread always has something to do: a thread that sometimes sleeps gets the little
 // time that the kernel leaves to threads without real-time priority.
 class BusyAsker {
  public:

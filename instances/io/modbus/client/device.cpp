@@ -89,9 +89,9 @@ LinkResult Device::write_output(Output& output) {
 bool Device::outputs_of(Output& output, MapValues& values) {
   bool silent = false;
   output.image->look([&](std::span<const std::byte> bytes, const OutputImage::Shown& shown) {
-    // A writer that dies in its silence says nothing with that: the outputs are not switched on again.
-    const bool has_died = shown.ended && output.is_silent && output.silent_with == shown.word;
-    silent = has_died || shown.silence >= config_.silent_after;
+    // A writer that ends in its silence says nothing with that: the outputs are not switched on again.
+    const bool has_ended = shown.ended && output.is_silent && output.silent_with == shown.word;
+    silent = has_ended || shown.silence >= config_.silent_after;
     if (silent) output.silent_with = shown.word;
     if (!silent) values.read_from(*output.map, bytes);
   });

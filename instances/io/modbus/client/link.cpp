@@ -45,8 +45,8 @@ Result<std::unique_ptr<Link>> Link::make(const DeviceConfig& device, const StopE
     return failure(ErrorCode::system, fmt::format("libmodbus refuses device '{}'", device.name), errno);
   }
   std::unique_ptr<Link> link(new Link(context, stop));
-  // The response timeout is then that of the whole response: a device that sends a byte now and then has no
-  // more time.
+  // The response timeout is then that of the whole response: a device that sends single bytes with pauses has
+  // no more time.
   modbus_set_byte_timeout(context, 0, 0);
   return link;
 }

@@ -2,8 +2,8 @@
  * Answers each request on the channel "talk" with the same contents. With TALKER_PEER=NAME it sends requests
  * of changing size to that instance, one at a time, and says what came of it: "N replies", "N lost",
  * "wrong ...". With TALKER_ADDRESS=NUMBER it sends them to that address, and also says (as for a NAME@HOST)
- * "N not sent", "N cycles". With TALKER_CALL=1 it also calls all nodes now and then; each that hears it says
- * "called by N".
+ * "N not sent", "N cycles". With TALKER_CALL=1 it also calls all nodes every 100 cycles; each that hears it
+ * says "called by N".
  */
 #include <stdio.h>
 #include <stdlib.h>
