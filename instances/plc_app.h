@@ -2,13 +2,13 @@
  * The contract between plc-instance and an application (the program of the user) or a component: plain C89,
  * no library to link. An application is one shared object that exports
  *
- *     plc_app_abi          PLC_APP_ABI_VERSION, checked before anything of it runs: write PLC_EXPORT_ABI;
- *     int plc_app_init(void)    called once after loading; calls __sys__setup__tasks(); 0 means success
- *     void plc_app_exit(void)   optional; called once when all tasks have ended, when another version of the
- *                          program has taken over from this one (see "Online change" below), or when the
- *                          runtime refuses the program after its plc_app_init; then areas have no addresses
+ * - plc_app_abi: PLC_APP_ABI_VERSION, checked before anything of it runs. Write PLC_EXPORT_ABI.
+ * - int plc_app_init(void): called once after loading. It calls __sys__setup__tasks(), and 0 means success.
+ * - void plc_app_exit(void), optional: called once when all tasks have ended, or when another version of the
+ *   program has taken over from this one (see "Online change" below). It is also called when the runtime
+ *   refuses the program after its plc_app_init; then areas have no addresses.
  *
- * and calls the functions of the runtime that are declared below; they are found when it is loaded.
+ * It calls the functions of the runtime that are declared below; they are found when it is loaded.
  *
  *     gcc -std=c89 -shared -fPIC -I FOLDER_OF_THIS_FILE -o my.so my.c
  *     plc-instance --check-application my.so

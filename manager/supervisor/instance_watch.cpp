@@ -187,7 +187,7 @@ void ManagedInstance::fall_silent(std::string_view known) {
   set_state(
       Phase::up, InstanceState::exception,
       fmt::format("{}{}its control thread has not answered for {} s: it waits for a lock that a task was "
-                  "caught with, tasks leave it no processor time, or a signal has stopped it",
+                  "caught with, tasks leave it no processor time, or a signal stopped it",
                   fault, fault.empty() ? "" : "; ",
                   std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count()));
   carry_out(decided({.cause = EndCause::silent, .order = order()}), std::string(status_.problem.view()));

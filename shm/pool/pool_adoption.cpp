@@ -194,8 +194,8 @@ Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, PoolLock& hel
     return failure(
         ErrorCode::refused,
         fmt::format("memory '{}': {} is left of user {}, and {} is sticky: only that user, root, or a "
-                    "manager that runs as root (within a second) can remove it; choose another name, or "
-                    "wait for that",
+                    "manager that runs as root can remove it. Choose another name, or wait for that: such a "
+                    "manager does it within a second",
                     name, path, left->owner.load(kRelaxed), MemoryFile::kDirectory));
   }
   if (::ftruncate(fd.get(), 0) != 0) return failure(ErrorCode::system, "cannot empty " + path, errno);

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Joins the units of a unity build, so that clang-tidy reads the headers of others once for many files.
 
-Usage: join_units.py BUILD   writes BUILD/joined/ with the joined files and their compile_commands.json, and prints the
-                             path of each file that clang-tidy has to read, the folder of its compile commands and
-                             the units that were joined in it, separated by tabs
+Usage: join_units.py BUILD
+
+It writes BUILD/joined/ with the joined files and their compile_commands.json. It prints the path of each file that
+clang-tidy has to read, the folder of its compile commands and the units that were joined in it, separated by tabs.
 
 Units of libraries are joined, each with others of its top-level folder. All other units stay as they are: programs and
 shared objects use names a second time that others of the folder have, and few units have another language version.

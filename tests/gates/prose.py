@@ -7,15 +7,15 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
   something. A part behind ":" or ";" or a dash is held to the same, and so is a clause behind "so", "because" and the like.
 * No clause with "what" is an object where a noun belongs: "of what is posted". Comments are not held to this one.
 * No sentence has the object of "who", a "who" behind "whether", or one that belongs to a "nobody" or "anybody" before it.
-* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Outside of comments there are
-  two exceptions. A sentence with one colon has at most 36, and neither half more than 30. Behind a colon, the parts that ";" or
-  ":" divides are counted one by one, and all together have at most 45. A list of more is written as a list.
+* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. A colon or ";" ends no sentence.
+  A list of more is written as a list. Each line of a message of several lines is a sentence of its own.
 * The text of an error of the programs does not begin with an imperative: "cannot open FILE", not "open FILE".
 * No text has a word that manager/glossary.md forbids (the column "not"), nor its plural, nor its forms with -ed and -ing.
 
 A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md). So are comments, docstrings and
 the texts of pictures (.svg). Strings of three words and more in C++, Python or CMake, or printed by a shell script, are texts:
-messages are among those. Not held are drawings and columns in comments, and raw strings.
+messages are among those. Not held are drawings and columns in comments, and raw strings. A message may be longer if it has
+columns, a declaration in Structured Text or a regular expression.
 """
 
 import argparse
@@ -30,8 +30,6 @@ from pathlib import Path
 
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
-WORDS_WITH_COLON = 36
-WORDS_IN_PARTS = 45
 
 OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
 # In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`, `asks nobody for it who reads`.
@@ -42,7 +40,8 @@ WITHIN = re.compile(
 # `says what is wrong` asks, `of what is wrong` does not.
 OBJECT = re.compile(r"\b(?:of|for|from|with|by|without|beside|than|takes?|adopts?) what \w", re.IGNORECASE)
 # The ends of sentences. A sentence begins with a capital letter, a digit, code, an option, or the name of an error and a colon.
-END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*(?:[A-Z0-9`\u0001]|--[a-z]|[a-z_]+: ))")
+# So does a line of a message: `\n` in C.
+END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*(?:[A-Z0-9`\u0001]|--[a-z]|[a-z_]+: ))|\\n")
 PART = re.compile(r"(?<=[:;])\s+|\s+[-\u2013]\s+")
 WORD = re.compile(r"[\w'\u0001][\w'/.,\u0001-]*")
 CODE = "\u0001"  # one word of code
@@ -59,8 +58,8 @@ C_TOKEN = re.compile(
     r""""(?P<text>(?:\\.|[^"\\\n])*)"|(?<![0-9a-fA-F])'(?:\\.[^'\n]*|[^'\\\n])'""", re.DOTALL)
 # Of a comment: columns, arrows, a line of usage.
 DRAWING = re.compile(r"\S   +\S|-->|──|\|  |^  +\S.*\[-")
-# Columns, a declaration in Structured Text.
-NO_PROSE = re.compile(r"\S {3,}\S|\w : \w")
+# Of a message: columns, a declaration in Structured Text, a regular expression.
+NO_PROSE = re.compile(r"\S {3,}\S|\w : \w|\(\?P<")
 # Of a comment in api/control.idl: lists of members.
 FOR_GENERATORS = re.compile(r"(row|columns): ")
 # In a comment of api/control.idl: a line for the generators.
@@ -303,17 +302,9 @@ def faults_of(kind, text, forbidden):
             yield text.find(sentence) + found.start(), f"a noun instead of '{sentence[found.start():][:30]}'"
         if kind == "comment" and FOR_GENERATORS.match(sentence):
             continue
-        before, colon, after = sentence.partition(": ")
-        counted = [before, *re.split(r"[:;]\s", after)] if colon and kind != "comment" else [sentence]
-        for part in counted:
-            words = len(WORD.findall(part))
-            if words > WORDS:
-                yield text.find(part), f"{words} words in a sentence, at most {WORDS}: {part[:50]}"
         words = len(WORD.findall(sentence))
-        if len(counted) == 2 and words > WORDS_WITH_COLON:
-            yield text.find(sentence), f"{words} words in a sentence with a colon, at most {WORDS_WITH_COLON}: {sentence[:50]}"
-        elif len(counted) > 2 and words > WORDS_IN_PARTS and not NO_PROSE.search(sentence):
-            yield text.find(sentence), f"{words} words in a sentence of parts, at most {WORDS_IN_PARTS}: {sentence[:50]}"
+        if words > WORDS and not (kind == "message" and NO_PROSE.search(sentence)):
+            yield text.find(sentence), f"{words} words in a sentence, at most {WORDS}: {sentence[:50]}"
     for found in forbidden.finditer(text) if forbidden else ():
         yield found.start(), f"'{found[0]}' is not a word of {GLOSSARY}"
 

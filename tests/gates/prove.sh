@@ -224,11 +224,13 @@ plant_in_prose "prose: who, within a sentence" "shm/planted.md:1: a clause begin
 plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..30})."
 plant_in_prose "prose: who, behind an and" "shm/planted.md:1: a clause begins with 'and who'" shm/planted.md "The task waits, and who asked hears of it."
 plant_in_prose "prose: what in the place of a noun" "shm/planted.md:1: a noun instead of 'of what was posted" shm/planted.md "The manager keeps a list of what was posted."
-plant_in_prose "prose: long sentence with a colon" "shm/planted.md:1: 37 words in a sentence with a colon, at most 36" shm/planted.md "A$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..17})."
+plant_in_prose "prose: long sentence with a colon" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..11})."
 plant_in_prose "prose: whom" "shm/planted.md:1: a clause begins with 'whom'" shm/planted.md "The log tells for whom the host posts."
 plant_in_prose "prose: whether who" "shm/planted.md:1: a clause begins with 'whether who'" shm/planted.md "The host checks whether who asks may post."
 plant_in_prose "prose: who, apart from its nobody" "shm/planted.md:1: a clause begins with 'nobody is served who'" shm/planted.md "Here nobody is served who has no key."
-plant_in_prose "prose: long sentence of parts" "shm/planted.md:1: 46 words in a sentence of parts, at most 45" shm/planted.md "A$(printf ' word%.0s' {1..15}): a$(printf ' word%.0s' {1..14}); a$(printf ' word%.0s' {1..14})."
+plant_in_prose "prose: long sentence of parts" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..10}): a$(printf ' word%.0s' {1..9}); a$(printf ' word%.0s' {1..9})."
+plant_in_prose "prose: long line of a message" "shm/base/planted.cpp:1: 31 words in a sentence, at most 30" shm/base/planted.cpp \
+  "const char* m = \"line one\\nA$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..11})\";"
 plant_in_prose "prose: synonym in plural" "shm/planted.md:1: 'missed cycles' is not a word of manager/glossary.md" shm/planted.md "The missed cycles are counted."
 plant_in_prose "prose: synonym with -ed" "shm/planted.md:1: 'hot swapped' is not a word of manager/glossary.md" shm/planted.md "The program is hot swapped."
 plant_in_prose "prose: tag of a type behind a sentence" "api/planted.idl:2: begins with 'who'" api/planted.idl "// It is written for each host
@@ -262,8 +264,10 @@ plant_in_prose "prose: text of a picture" "api/planted.svg:2: 'DDS server' is no
 <text x="1">the DDS <tspan>server</tspan></text></svg>'
 new_tree
 echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md"
-echo "Nobody waits. A client$(printf ' word%.0s' {1..15}): a$(printf ' word%.0s' {1..14}); a$(printf ' word%.0s' {1..12})." >>"$plot/tree/shm/planted.md"
+echo "Nobody waits. A client$(printf ' word%.0s' {1..9}): a$(printf ' word%.0s' {1..9}); a$(printf ' word%.0s' {1..8})." >>"$plot/tree/shm/planted.md"
 echo "// Takes$(printf ' word%.0s' {1..28}). timed_out: after$(printf ' word%.0s' {1..28})." >"$plot/tree/shm/planted.hpp"
+printf '%s\n' "const char* m = \"A$(printf ' word%.0s' {1..29})\\nA$(printf ' word%.0s' {1..29})\\n\";" >"$plot/tree/shm/planted.cpp"
+echo "PLANTED = r\"(?P<word>a)$(printf ' word%.0s' {1..31})\"" >"$plot/tree/tests/planted.py"
 echo "// row: host$(printf '; word%.0s' {1..40})" >"$plot/tree/api/planted.idl" && commit_tree
 "$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }
 

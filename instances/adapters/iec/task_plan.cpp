@@ -341,7 +341,8 @@ class Planner {
     for (const auto& [name, tasks] : users) {
       const Variable& variable = *plan_.globals.at(name);
       if (variable.constant || !can_interleave(tasks) || !changes_in_a_cycle(name, tasks)) continue;
-      name_shared(variable, tasks, "; globals = \"copy\" in [program.NAME] of the task file prevents that");
+      name_shared(variable, tasks,
+                  ". Set globals = \"copy\" in [program.NAME] of the task file to prevent that");
     }
   }
   // Of a task that another one can pre-empt, and of a program without a copy.

@@ -155,8 +155,8 @@ TEST_F(MatiecGlue, NamesTheGlobalsThatMayChangeInTheMiddleOfACycle) {
   const std::string both = std::string(kFast) + "PROGRAM one WITH fast : Main; PROGRAM two WITH slow : Main;";
   EXPECT_THAT(texts(write(kMain, kGo, "TASK slow (INTERVAL := T#1s, PRIORITY := 5);" + both).remarks),
               ElementsAre("c.st:2:12: the tasks slow, fast use go and can pre-empt each other: it may change "
-                          "in the middle of a cycle; globals = \"copy\" in [program.NAME] of the task file "
-                          "prevents that"));
+                          "in the middle of a cycle. Set globals = \"copy\" in [program.NAME] of the task "
+                          "file to prevent that"));
   EXPECT_THAT(texts(write(kMain, kGo, "TASK slow (INTERVAL := T#1s, PRIORITY := 1);" + both).remarks),
               IsEmpty());
   EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL CONSTANT go : BOOL; END_VAR",
