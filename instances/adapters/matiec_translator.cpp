@@ -2,10 +2,12 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
@@ -21,6 +23,7 @@ namespace {
 
 constexpr const char* kConfigurationFile = "plchost_configuration.c";
 constexpr const char* kCode = "POUS.c";
+constexpr std::string_view kTextMacro = "__STRING_LITERAL(";
 
 class MatiecTranslator : public Translator {
  public:
@@ -45,7 +48,8 @@ class MatiecTranslator : public Translator {
   }
 
   bool translate() override {
-    return translate_sources() && read_located() && (context_.order.debug ? instrument() : drop_directives());
+    return translate_sources() && read_located() && end_escapes() &&
+           (context_.order.debug ? instrument() : drop_directives());
   }
 
   [[nodiscard]] iec::Glue glue(const iec::Resource& resource) override {
@@ -142,10 +146,23 @@ class MatiecTranslator : public Translator {
         fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
   }
 
+  // In the initial values of globals.
+  bool end_escapes() {
+    std::vector<std::string> files{configuration().name};
+    for (const iec::Resource& resource : configuration().resources)
+      files.push_back(resource.name.empty() ? "RESOURCE" : resource.name);
+    return std::ranges::all_of(files, [&](const std::string& name) {
+      const auto code = context_.folder().read(name + ".c");
+      return context_.has(code) &&
+             context_.has(context_.folder().replace(name + ".c", iec::with_ended_escapes(*code, kTextMacro)));
+    });
+  }
+
   // Of the program, as iec2c should have written it.
   [[nodiscard]] std::optional<std::string> read_code() {
     const auto code = context_.folder().read(kCode);
-    return context_.has(code) ? std::optional(matiec::with_first_turns(*code)) : std::nullopt;
+    if (!context_.has(code)) return std::nullopt;
+    return iec::with_ended_escapes(matiec::with_first_turns(*code), kTextMacro);
   }
 
   bool drop_directives() {

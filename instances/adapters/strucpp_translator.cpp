@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/strucpp/compiler.hpp"
 #include "instances/adapters/strucpp/glue.hpp"
 #include "instances/adapters/strucpp/plan_file.hpp"
@@ -59,7 +60,7 @@ class StrucppTranslator : public Translator {
   bool translate() override {
     auto c = context_.words_of("CC", "cc");
     auto cpp = context_.words_of("CXX", "c++");
-    if (!c || !cpp || (context_.order.debug && !instrument())) return false;
+    if (!c || !cpp || !end_escapes() || (context_.order.debug && !instrument())) return false;
     words_ = *std::move(cpp);
     find_flags();
     const std::string adapters = context_.adapters();
@@ -113,6 +114,16 @@ class StrucppTranslator : public Translator {
     probe.insert(probe.end(), {flag, "-fsyntax-only", "-x", "c++", "/dev/null"});
     const auto end = run_program(probe, context_.folder().path(), {.time = context_.order.translate_limit});
     if (end && end->success()) flags_.push_back(flag);
+  }
+
+  bool end_escapes() {
+    std::vector<std::string> files = files_;
+    files.emplace_back("generated.hpp");
+    return std::ranges::all_of(files, [&](const std::string& file) {
+      const auto code = context_.folder().read(file);
+      return context_.has(code) &&
+             context_.has(context_.folder().replace(file, iec::with_ended_escapes(*code)));
+    });
   }
 
   bool instrument() {

@@ -37,7 +37,7 @@ PROGRAM Doubler
   flag := go;
 END_PROGRAM
 PROGRAM Counter
-  VAR edges AT %QB4 : USINT; END_VAR
+  VAR END_VAR
   edges := edges + 1;
 END_PROGRAM
 PROGRAM Loop
@@ -198,6 +198,24 @@ TEST_P(TranslatedText, LoopsAsOftenAsItsBoundsSay) {
   EXPECT_EQ(turns.wide, 1);
   EXPECT_EQ(turns.down, 3);
   EXPECT_EQ(turns.none, 0);
+}
+
+TEST_P(TranslatedText, HasEachSignOfItsTexts) {
+  const ProgramEnd end = build(R"(
+PROGRAM Prg
+  VAR_EXTERNAL note : STRING; END_VAR
+  VAR twice AT %QW1 : INT; alarm : STRING := 'Alarm$0A1'; line : STRING; END_VAR
+  line := 'p$N5$41B$0D1';
+  twice := 0;
+  IF alarm = 'Alarm$0A$31' THEN twice := twice + 1; END_IF;
+  IF note = 'a$0A$62$31' THEN twice := twice + 2; END_IF;
+  IF line = 'p$0A$35$41$42$0D$31' THEN twice := twice + 4; END_IF;
+END_PROGRAM
+CONFIGURATION c VAR_GLOBAL note : STRING := 'a$0Ab1'; END_VAR RESOURCE r ON PLC
+TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM main WITH fast : Prg; END_RESOURCE END_CONFIGURATION)");
+  ASSERT_TRUE(end.success()) << end.output;
+  start(so("twice"));
+  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; })) << outputs().twice;
 }
 
 TEST_P(TranslatedText, ThatRetainsVariablesHasThemAfterARestart) {
