@@ -140,6 +140,21 @@ TextForIec2c with_insertions(std::string_view text, const SectionSplitter::Inser
   return result;
 }
 
+/// Writes signs of a text by their code where iec2c would take them for others: "(*" begins a comment in a
+/// text, too, and $L is a line feed in C.
+void name_signs(const Token& token, std::string& text, SectionSplitter::Insertions& insertions) {
+  const auto write = [&](std::size_t at, std::string_view first, std::string_view more) {
+    text.replace(token.offset + at, first.size(), first);
+    insertions.emplace_back(token.offset + at + first.size(), more);
+  };
+  for (std::size_t i = 0; i + 1 < token.text.size(); ++i) {
+    const std::string_view rest = std::string_view(token.text).substr(i);
+    if (rest.starts_with("(*")) write(i, "$", "28");
+    if (rest.starts_with("$L") || rest.starts_with("$l")) write(i, "$0", "A");
+    if (rest.starts_with('$')) ++i;
+  }
+}
+
 TextForIec2c for_iec2c(const iec::Source& source) {
   constexpr std::string_view kAnyInterval = "T#1ms";
   std::string text = source.text;
@@ -147,10 +162,13 @@ TextForIec2c for_iec2c(const iec::Source& source) {
   for (const iec::Stretch& comment : tokens.new_comments) blank(text, comment.offset, comment.bytes);
   IntervalFinder intervals;
   SectionSplitter sections;
+  SectionSplitter::Insertions insertions;
   for (const Token& token : tokens.all) {
     const bool is_interval = intervals.is_interval(token);
     sections.look(token);
-    if (is_of_other_tools(token)) {
+    if (token.kind == Token::Kind::text) {
+      name_signs(token, text, insertions);
+    } else if (is_of_other_tools(token)) {
       blank(text, token.offset, token.text.size());
     } else if (token.kind == Token::Kind::place) {
       text.replace(token.offset, token.text.size(), iec::folded(token.text));
@@ -159,7 +177,9 @@ TextForIec2c for_iec2c(const iec::Source& source) {
       text.replace(token.offset, kAnyInterval.size(), kAnyInterval);
     }
   }
-  return with_insertions(text, sections.insertions());
+  std::ranges::copy(sections.insertions(), std::back_inserter(insertions));
+  std::ranges::stable_sort(insertions, {}, [](const auto& one) { return one.first; });
+  return with_insertions(text, insertions);
 }
 
 }  // namespace

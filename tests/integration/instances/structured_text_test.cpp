@@ -204,18 +204,25 @@ TEST_P(TranslatedText, HasEachSignOfItsTexts) {
   const ProgramEnd end = build(R"(
 PROGRAM Prg
   VAR_EXTERNAL note : STRING; END_VAR
-  VAR twice AT %QW1 : INT; alarm : STRING := 'Alarm$0A1'; line : STRING; END_VAR
+  VAR twice AT %QW1 : INT; alarm : STRING := 'Alarm$0A1'; line : STRING; code : STRING; feed : STRING; ran : INT; END_VAR
   line := 'p$N5$41B$0D1';
-  twice := 0;
+  code := '(*';
+  ran := 0;
+  ran := ran + 32;
+  line := CONCAT(line, '*)');
+  feed := '$L1';
+  twice := ran;
   IF alarm = 'Alarm$0A$31' THEN twice := twice + 1; END_IF;
   IF note = 'a$0A$62$31' THEN twice := twice + 2; END_IF;
-  IF line = 'p$0A$35$41$42$0D$31' THEN twice := twice + 4; END_IF;
+  IF line = 'p$0A$35$41$42$0D$31$2A$29' THEN twice := twice + 4; END_IF;
+  IF code = '$28$2A' THEN twice := twice + 8; END_IF;
+  IF feed = '$0A$31' THEN twice := twice + 16; END_IF;
 END_PROGRAM
 CONFIGURATION c VAR_GLOBAL note : STRING := 'a$0Ab1'; END_VAR RESOURCE r ON PLC
 TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM main WITH fast : Prg; END_RESOURCE END_CONFIGURATION)");
   ASSERT_TRUE(end.success()) << end.output;
   start(so("twice"));
-  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; })) << outputs().twice;
+  EXPECT_TRUE(eventually([&] { return outputs().twice == 63; })) << outputs().twice;
 }
 
 TEST_P(TranslatedText, ThatRetainsVariablesHasThemAfterARestart) {

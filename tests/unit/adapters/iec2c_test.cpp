@@ -81,6 +81,13 @@ TEST(TheJoinedSource, HasLocatedVariablesInSectionsOfTheirOwn) {
   }
 }
 
+TEST(TheJoinedSource, HasNoCommentWithinATextAndNoLineFeed) {
+  const JoinedSource joined(
+      std::vector<iec::Source>{{"a.st", "t := 'ab(*no $L1$$L$'(*('; (* '(*' *) n := NOSUCH; u := '*)';"}});
+  EXPECT_EQ(joined.text(), "t := 'ab$28*no $0A1$$L$'$28*('; (* '(*' *) n := NOSUCH; u := '*)';\n");
+  EXPECT_EQ(joined.place(1, 50), (iec::SourcePlace{"a.st", 1, 45}));
+}
+
 TEST(TheJoinedSource, CountsColumnsWithoutTheSectionsThatItHasInserted) {
   const JoinedSource joined(std::vector<iec::Source>{
       {"0.st", "\n"},
