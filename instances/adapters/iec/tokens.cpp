@@ -13,6 +13,10 @@ namespace {
 bool is_letter(char c) noexcept {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
 }
+/// Of a sign in UTF-8 that is not ASCII.
+bool is_foreign(char c) noexcept {
+  return static_cast<unsigned char>(c) >= 0x80;
+}
 bool is_digit(char c) noexcept {
   return c >= '0' && c <= '9';
 }
@@ -30,6 +34,8 @@ bool is_date(std::string_view type) noexcept {
                                                     "TOD", "TIME_OF_DAY",   "LTOD", "LTIME_OF_DAY"};
   return std::ranges::any_of(kDates, [&](std::string_view date) { return same(date, type); });
 }
+
+constexpr std::size_t kMostForeign = 20;  // problems; a file that is no text has no more
 
 class Reader {
  public:
@@ -108,9 +114,19 @@ class Reader {
     if (at() == '\'' || at() == '"') return read_text();
     if (at() == '%') return read_location();
     if (at() == '{') return read_pragma();
+    if (is_foreign(at())) return read_foreign();
     constexpr std::array<std::string_view, 8> kPairs{":=", "=>", "..", "<=", ">=", "<>", "**", "?="};
     const auto pair = std::ranges::find_if(kPairs, [&](std::string_view two) { return begins(two); });
     step(pair == kPairs.end() ? 1 : 2);
+    return Token::Kind::symbol;
+  }
+  Token::Kind read_foreign() {
+    if (tokens_.problems.size() < kMostForeign) {
+      tokens_.problems.push_back({place_,
+                                  "this letter is not ASCII; outside of comments and texts there are only "
+                                  "A to Z, digits, _ and the signs of the language"});
+    }
+    step_while(is_foreign);
     return Token::Kind::symbol;
   }
   Token::Kind read_name() {

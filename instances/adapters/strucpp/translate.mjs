@@ -52,8 +52,9 @@ function explained(found) {
   if (character !== null) {
     const number = fileNumbers.get(found.file ?? sources[0].name);
     const offset = Number(character[2]);
-    // An instruction list was rewritten before: the offset is then none of the source.
-    if (sources[number]?.text.startsWith(character[1], offset)) return { place: placeAt(number, offset), text: `unexpected character '${character[1]}'` };
+    // The compiler has names in upper case. An instruction list was rewritten before: the offset is then none of the source.
+    const written = sources[number]?.text.slice(offset, offset + character[1].length) ?? '';
+    if (written !== '' && written.toUpperCase() === character[1].toUpperCase()) return { place: placeAt(number, offset), text: `unexpected character '${written}'` };
   }
   const global = /^Shared global '(\w+)' /.exec(found.message);
   const place = global === null ? undefined : placeOfGlobal(global[1]);

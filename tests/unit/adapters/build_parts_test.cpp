@@ -259,6 +259,14 @@ TEST_F(TranslatedByStrucpp, ACharacterThatIsNotExpectedIsToldAtItsPlace) {
       << "the offset is none of the source";
 }
 
+TEST_F(TranslatedByStrucpp, ALetterThatIsNotAsciiIsToldAsItIsWritten) {
+  const std::string one = put("one.st", "\n z\xC3\xA4hler := 1;\n");
+  EXPECT_EQ(said({one},
+                 "return {success: false, warnings: [], errors: [{message: 'unexpected character: ->"
+                 "\xC3\x84<- at offset: 3, skipped 1 characters.', line: 0, column: 0}]};"),
+            one + ":2:3: unexpected character '\xC3\xA4'");
+}
+
 TEST_F(TranslatedByStrucpp, AGlobalFunctionBlockIsToldWhereItIsDeclared) {
   const std::string one = put("one.st", "PROGRAM p\nVAR_EXTERNAL gf : fb; END_VAR\ngf();\nEND_PROGRAM\n");
   const std::string two = put(

@@ -44,6 +44,13 @@ TEST(IecTokens, SayWhatHasNoEnd) {
   EXPECT_EQ(describe(tokens_of("{a", "x.st").problems.at(0)), "x.st:1:1: this pragma has no '}'");
 }
 
+TEST(IecTokens, SayWhereALetterIsNoneOfTheLanguage) {
+  const Tokens tokens = tokens_of("(* \xC3\xA4 *) 'a\xC3\xA4'\n  z\xC3\xA4hler := 1;", "x.st");
+  ASSERT_EQ(tokens.problems.size(), 1U);
+  EXPECT_EQ(describe(tokens.problems.front()).substr(0, 35), "x.st:2:4: this letter is not ASCII;");
+  EXPECT_LE(tokens_of(std::string(99, '\xFF') + " \xFF", "x.st").problems.size(), 2U);
+}
+
 TEST(IecTokens, CompareNamesWithoutCase) {
   const Tokens tokens = tokens_of("Program 'program'", "x.st");
   EXPECT_TRUE(tokens.all.at(0).is("PROGRAM"));
