@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -168,6 +169,12 @@ class TaskFileReader {
   void read_programs(const TomlValue& value, const Resource* resource) {
     read_each("program", programs_, value, resource,
               [&](const KnownProgram& program, const TomlTable& keys, const TomlValue& one) {
+                const auto [before, is_first] = lines_of_programs_.try_emplace(program.name, one.line);
+                if (!is_first) {
+                  return problem(one,
+                                 fmt::format("the program {} is given in line {}, too; remove one of both",
+                                             *program.name, before->second));
+                }
                 SectionReader reader(keys, one.line, fmt::format("program {}", *program.name), problems_);
                 reader.tell_columns();
                 *program.copies_globals = read_choice(reader, "globals", kGlobals) == 1;
@@ -297,6 +304,7 @@ class TaskFileReader {
   std::vector<Resource*> resources_;
   std::vector<KnownTask> tasks_;
   std::vector<KnownProgram> programs_;
+  std::map<const std::string*, unsigned> lines_of_programs_;  // those that are given
   std::vector<ConfigProblem> problems_;
 };
 

@@ -236,6 +236,8 @@ TEST_F(TaskFile, GivesAProgramCopiesOfItsGlobals) {
 }
 
 TEST_F(TaskFile, RefusesWhatIsNoOptionOfAProgram) {
+  EXPECT_THAT(problems("[program.one]\nglobals = 'copy'\n[program.One]\nglobals = 'shared'"),
+              ElementsAre(HasSubstr("the program one is given in line")));
   EXPECT_THAT(problems("[program.on]\nglobals = 'copy'"),
               ElementsAre("a.toml:1:10: there is no program 'on'; there are one, rest; did you mean 'one'?"));
   EXPECT_THAT(problems("[program.one]\nglobals = 'own'\nglobal = 'copy'"),
