@@ -35,6 +35,16 @@ function withoutTexts(text) {
   return text.replace(/\(\*[\s\S]*?\*\)|\/\*[\s\S]*?\*\/|\/\/[^\n]*|'(?:\$.|[^'$\n])*'/g, (part) => part.replace(/[^\n]/g, ' '));
 }
 
+// Where a comment begins that has no end.
+function placeOfComment(file) {
+  const searched = file === undefined ? [...sources.keys()] : [fileNumbers.get(file) ?? -1];
+  for (const number of searched) {
+    const at = withoutTexts(sources[number]?.text ?? '').search(/\(\*|\/\*/);
+    if (at >= 0) return placeAt(number, at);
+  }
+  return undefined;
+}
+
 // Where a global is declared.
 function placeOfGlobal(name) {
   for (const [number, { text }] of sources.entries()) {
@@ -56,6 +66,8 @@ function explained(found) {
     const written = sources[number]?.text.slice(offset, offset + character[1].length) ?? '';
     if (written !== '' && written.toUpperCase() === character[1].toUpperCase()) return { place: placeAt(number, offset), text: `unexpected character '${written}'` };
   }
+  const comment = found.message === 'Unclosed block comment' ? placeOfComment(found.file) : undefined;
+  if (comment !== undefined) return { place: comment, text: 'this comment has no end' };
   const global = /^Shared global '(\w+)' /.exec(found.message);
   const place = global === null ? undefined : placeOfGlobal(global[1]);
   return place === undefined ? undefined : { place, text: found.message };

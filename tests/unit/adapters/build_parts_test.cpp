@@ -267,6 +267,13 @@ TEST_F(TranslatedByStrucpp, ALetterThatIsNotAsciiIsToldAsItIsWritten) {
             one + ":2:3: unexpected character '\xC3\xA4'");
 }
 
+TEST_F(TranslatedByStrucpp, ACommentWithoutAnEndIsToldWhereItBegins) {
+  const std::string one = put("one.st", "(* done *) a := '(*'; // (*\n");
+  const std::string two = put("two.st", "\n  b := 1; (* open\n  c := 2;\n");
+  EXPECT_EQ(said({one, two}, "throw new Error('Unclosed block comment');"),
+            two + ":2:11: this comment has no end");
+}
+
 TEST_F(TranslatedByStrucpp, AGlobalFunctionBlockIsToldWhereItIsDeclared) {
   const std::string one = put("one.st", "PROGRAM p\nVAR_EXTERNAL gf : fb; END_VAR\ngf();\nEND_PROGRAM\n");
   const std::string two = put(
