@@ -266,6 +266,26 @@ class NameCheck {
   iec::SourceProblems& problems_;
 };
 
+// iec2c takes such a word for the configuration everywhere.
+void refuse_name_of_configuration(const iec::Project& project, const iec::Configuration& configuration,
+                                  iec::SourceProblems& problems) {
+  const auto check = [&](const std::string& name, const iec::SourcePlace& place) {
+    if (configuration.name.empty() || iec::folded(name) != iec::folded(configuration.name)) return;
+    problems.push_back({place, fmt::format("'{}' is also the name of the CONFIGURATION, which iec2c does not "
+                                           "tell apart; choose another one",
+                                           name)});
+  };
+  const auto check_all = [&](const std::vector<iec::Variable>& variables) {
+    for (const iec::Variable& variable : variables) check(variable.name, variable.place);
+  };
+  for (const iec::Pou& pou : project.pous) {
+    check(pou.name, pou.name_place);
+    check_all(pou.variables);
+  }
+  check_all(configuration.globals);
+  for (const iec::Resource& resource : configuration.resources) check_all(resource.globals);
+}
+
 }  // namespace
 
 iec::SourceProblems refused_names(const iec::Project& project) {
@@ -277,6 +297,7 @@ iec::SourceProblems refused_names(const iec::Project& project) {
   }
   for (const iec::DeclaredType& type : project.types) names.check(type);
   for (const iec::Configuration& configuration : project.configurations) {
+    refuse_name_of_configuration(project, configuration, problems);
     names.check(configuration.name, configuration.place);
     names.check(configuration.globals);
     for (const iec::Resource& resource : configuration.resources) {

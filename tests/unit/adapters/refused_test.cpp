@@ -46,6 +46,17 @@ TEST(RefusedByMatiec, AreSuchNamesOfAConfiguration) {
                   HasSubstr("'NULL' is a macro"), HasSubstr("RESOURCE Main: a POU has this name")));
 }
 
+TEST(RefusedByMatiec, AreOthersWithTheNameOfTheConfiguration) {
+  EXPECT_THAT(
+      names("FUNCTION cell : INT END_FUNCTION PROGRAM Main VAR a : INT;\n cell : INT; END_VAR END_PROGRAM "
+            "CONFIGURATION Cell VAR_GLOBAL CELL "
+            ": INT; "
+            "END_VAR RESOURCE r ON PLC VAR_GLOBAL Cell : INT; END_VAR END_RESOURCE END_CONFIGURATION"),
+      ElementsAre(HasSubstr("a.st:1:10: 'cell' is"),
+                  HasSubstr("a.st:2:2: 'cell' is also the name of the CONFIGURATION"),
+                  HasSubstr("'CELL' is also"), HasSubstr("'Cell' is also")));
+}
+
 TEST(RefusedByMatiec, IsNoNameOfWhichItMakesAnother) {
   EXPECT_THAT(
       names("TYPE Mode : (eof, nan); END_TYPE PROGRAM p VAR pi : REAL; m : Mode := eof; END_VAR END_PROGRAM"),
