@@ -217,6 +217,8 @@ class Plan {
     if (member === undefined && variable.section !== 'external') variable.section = 'other';
     if (declaration.initialValue?.kind === 'ArrayLiteralExpression') this.dropped.set(`${variable.place}`, variable);
     const element = declaration.type.elementTypeName?.toUpperCase();
+    const type = element ?? declaration.type.name.toUpperCase();
+    if (/^CTU?D(_\w+)?$/.test(type) && !this.blocks.has(type)) this.remark(node, `${name}: STruC++ counts falling edges of CD of ${type}; IEC 61131-3 counts rising ones`);
     const dimensions = declaration.type.arrayDimensions;
     if (element !== undefined && dimensions !== undefined && this.isBlock(element)) return this.elements(variable, element, dimensions);
     const isBlock = this.isBlock(declaration.type.name.toUpperCase()) && (declaration.type.referenceKind ?? 'none') === 'none';

@@ -17,6 +17,7 @@ namespace plchost::testing {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kTwice = R"(
 PROGRAM Doubler
@@ -351,6 +352,20 @@ TEST_F(TranslatedByStrucpp, ThatStrucppRefusesIsToldInItsOwnWords) {
   text.replace(text.find("    TASK fast"), 0, "    VAR_GLOBAL own : INT; END_VAR\n");
   EXPECT_THAT(build(text, "twice", "strucpp").output,
               HasSubstr("own: STruC++ knows no VAR_GLOBAL in a RESOURCE"));
+}
+
+TEST_F(TranslatedByStrucpp, ThatCountsDownIsToldOfTheEdge) {
+  const ProgramEnd end = build(R"(
+PROGRAM Prg VAR c : CTD; up : CTU;
+  d : CTUD; END_VAR
+  c(CD := TRUE, PV := 3);
+END_PROGRAM
+CONFIGURATION k RESOURCE r ON PLC TASK t (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM m WITH t : Prg; END_RESOURCE END_CONFIGURATION)",
+                               "counts", "strucpp");
+  ASSERT_TRUE(end.success()) << end.output;
+  EXPECT_THAT(end.output, HasSubstr("counts.st:2:17: note: c: STruC++ counts falling edges"));
+  EXPECT_THAT(end.output, HasSubstr("counts.st:3:3: note: d: STruC++ counts falling edges"));
+  EXPECT_THAT(end.output, Not(HasSubstr("up: STruC++")));
 }
 
 TEST_F(TranslatedByStrucpp, ThatReadsBeyondAnArrayStopsByAnException) {
