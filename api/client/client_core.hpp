@@ -75,6 +75,8 @@ class ClientCore {
                                      TimePoint deadline);
   Async<Result<VariableListing>> list_variables(std::string host, std::string instance, VariableQuery query,
                                                 TimePoint deadline);
+  Async<Result<DebugPart>> read_debug(std::string host, std::string instance, DebugQuery query,
+                                      TimePoint deadline);
   Async<Result<std::vector<plc_HostFinding>>> check_host(std::string host, TimePoint deadline);
   Async<Result<bool>> has_all_transitions(std::string host, TimePoint deadline);
 
@@ -198,7 +200,9 @@ class ClientCore {
   Duration quiet_ = kQuiet;
   dds::TopicReader replies_;
   Inbox<ApiReply> replied_;
-  std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>, Pages<plc_VariablePage>> pages_;
+  std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>, Pages<plc_VariablePage>,
+             Pages<plc_DebugPage>>
+      pages_;
   dds::TopicReader acks_;
   dds::TopicReader runs_;
   Inbox<Result<RunReport>> run_;

@@ -101,4 +101,14 @@ Async<Result<VariableListing>> ClientCore::list_variables(std::string host, std:
   co_return co_await ask_for_page<plc_VariablePage>(std::move(request), deadline);
 }
 
+Async<Result<DebugPart>> ClientCore::read_debug(std::string host, std::string instance, DebugQuery query,
+                                                TimePoint deadline) {
+  ApiRequest request{.host = std::move(host),
+                     .operation = plc_OPERATION_READ_DEBUG,
+                     .instance = std::move(instance),
+                     .argument = "",
+                     .part = part_of(query)};
+  return ask_for_page<plc_DebugPage>(std::move(request), deadline);
+}
+
 }  // namespace plchost

@@ -10,6 +10,7 @@
 
 #include <control.h>
 
+#include "api/dds/debug_page.hpp"
 #include "api/dds/log_page.hpp"
 #include "api/dds/node_page.hpp"
 #include "api/dds/object_page.hpp"

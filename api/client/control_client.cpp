@@ -93,6 +93,11 @@ Result<VariableListing> ControlClient::list_variables(const std::string& host, c
   return wait(core_->list_variables(host, instance, query, deadline));
 }
 
+Result<DebugPart> ControlClient::read_debug(const std::string& host, const std::string& instance,
+                                            const DebugQuery& query, TimePoint deadline) {
+  return wait(core_->read_debug(host, instance, query, deadline));
+}
+
 Result<std::vector<plc_HostFinding>> ControlClient::check_host(const std::string& host, TimePoint deadline) {
   return wait(core_->check_host(host, deadline));
 }

@@ -116,6 +116,10 @@ class ControlClient {
   /// such instance or variable, or it declares none.
   [[nodiscard]] Result<VariableListing> list_variables(const std::string& host, const std::string& instance,
                                                        const VariableQuery& query, TimePoint deadline);
+  /// The state of the debugger of an instance, or a part of it. The code of the failure is the host's own:
+  /// not_found: no such instance, or its application is no debug build.
+  [[nodiscard]] Result<DebugPart> read_debug(const std::string& host, const std::string& instance,
+                                             const DebugQuery& query, TimePoint deadline);
   /// One for each instance; count 0: it never had an exception.
   [[nodiscard]] Result<std::vector<plc_ExceptionStatus>> exceptions(const std::string& host,
                                                                     TimePoint deadline);

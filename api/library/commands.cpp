@@ -54,8 +54,6 @@ std::string_view argument_name(OperationArgument argument) {
       return "variable";
     case OperationArgument::debug_command:
       return "command";
-    case OperationArgument::debug_part:
-      return "session offset";
   }
   return "";
 }

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "api/dds/debug_page.hpp"
 #include "api/dds/log_page.hpp"
 #include "api/dds/node_page.hpp"
 #include "api/dds/object_page.hpp"
@@ -75,13 +76,14 @@ void ControlServer::Parts::list_variables(const dds::Guid& client, const plc_Req
   if (!begun) tell(client, identity, begun.error().code, begun.error().describe());
 }
 
-// Its argument was checked. The answer is short, so it needs no page of its own.
 void ControlServer::Parts::read_debug(const dds::Guid& client, const plc_Request& request) {
-  constexpr std::size_t kMost = 500;  // of Reply.text
-  const auto part = DebugPart::parse(dds::text_of(request.argument)).value_or(DebugPart{});
-  const auto text = read_debug_part(pool.name(), dds::text_of(request.instance), part, kMost);
-  tell(client, request.header.request_identity, text ? ErrorCode::ok : text.error().code,
-       text ? *text : text.error().describe());
+  const plc_SampleIdentity& identity = request.header.request_identity;
+  const auto part =
+      read_debug_part(pool.name(), dds::text_of(request.instance), debug_query_of(request.part));
+  if (!part) return tell(client, identity, part.error().code, part.error().describe());
+  DebugPageSample sample(*part);
+  dds::copy_text(sample.page().instance, dds::text_of(request.instance));
+  send_page(client, identity, sample.page());
 }
 
 void ControlServer::Parts::tell_variables(std::vector<VariableLister::Finished> finished) {

@@ -101,7 +101,6 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case OperationArgument::variable_value:
     case OperationArgument::variable_or_all:  // the instance knows its variables
     case OperationArgument::debug_command:    // and its debugger
-    case OperationArgument::debug_part:
     case OperationArgument::none:
       return {};
     case OperationArgument::path:

@@ -45,7 +45,6 @@ enum class OperationArgument : std::uint8_t {
   variable_value,   ///< NAME=VALUE: a variable of the application, and a value as Structured Text writes it
   variable_or_all,  ///< name of a variable; "*": all
   debug_command,    ///< of instances/debugging.md
-  debug_part,       ///< two numbers
 };
 
 /// The options of a request beside its argument.

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,12 +15,18 @@
 
 namespace plchost {
 
-/// A request of a debugger: a part of the state, for a session.
-struct DebugPart {
+/// Which part of the state is asked for, and by whose debugger.
+struct DebugQuery {
   std::uint64_t session = 0;  ///< 0: of a client that only looks
-  std::uint64_t offset = 0;
-  /// "SESSION OFFSET"; nothing: it is not that.
-  [[nodiscard]] static std::optional<DebugPart> parse(std::string_view text) noexcept;
+  std::uint64_t offset = 0;   ///< of the first byte
+};
+
+/// A part of the state.
+struct DebugPart {
+  std::uint64_t version = 0;  ///< of the state: parts of two versions do not fit together
+  std::uint64_t size = 0;     ///< of the whole state
+  std::uint64_t offset = 0;   ///< of the first byte of `text` in it
+  std::string text = {};
 };
 
 inline constexpr std::size_t kMaxDebugState = 65520;
@@ -39,7 +44,6 @@ struct DebugPageLayout {
   // Written by the API server: the debugger that asked last, and when (CLOCK_MONOTONIC).
   std::atomic<std::uint64_t> asking_session{0};
   std::atomic<std::int64_t> asked_ns{0};
-  std::atomic<std::int64_t> reading_ns{0};  ///< when a part was read behind which there are others; 0: none
   Seqlock<DebugState> state;
 };
 
@@ -61,10 +65,6 @@ class DebugPage {
     TimePoint when;
   };
   [[nodiscard]] Asked asked() const noexcept;
-  /// A debugger is about to read the other parts of the state: another one would make it begin anew. Not for
-  /// longer than kLongestRead since the first such call, or since write().
-  [[nodiscard]] bool is_being_read(TimePoint now) noexcept;
-  static constexpr Duration kLongestRead = std::chrono::milliseconds(500);
 
  private:
   explicit DebugPage(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
@@ -75,13 +75,12 @@ class DebugPage {
   MemoryFile memory_;
   std::uint64_t version_ = 0;
   std::string shown_;
-  std::optional<TimePoint> read_since_;
 };
 
-/// The API server's end: "VERSION SIZE " and as much of the state from the offset on as `most` bytes hold.
-/// Tells the instance that its debugger is there. not_found: the application of the instance is no debug
-/// build. corrupt: not such a page. busy: it was written all the time; ask again.
-[[nodiscard]] Result<std::string> read_debug_part(std::string_view pool, std::string_view instance,
-                                                  DebugPart part, std::size_t most);
+/// The API server's end: the state from the offset on. Tells the instance that its debugger is there.
+/// not_found: the application of the instance is no debug build. corrupt: not such a page. busy: it was
+/// written all the time; ask again.
+[[nodiscard]] Result<DebugPart> read_debug_part(std::string_view pool, std::string_view instance,
+                                                const DebugQuery& query);
 
 }  // namespace plchost

@@ -9,7 +9,6 @@
 #include "instances/runtime/debug/breakpoint.hpp"
 #include "instances/runtime/debug/condition.hpp"
 #include "instances/runtime/debug/declared_pou.hpp"
-#include "shm/pages/debug_page.hpp"
 
 namespace {
 
@@ -79,14 +78,12 @@ void find_place(std::string_view text) {
 
 }  // namespace
 
-// Messages of a client of the Debug Adapter Protocol, commands of a debugger, places, and questions for its
-// state.
+// Messages of a client of the Debug Adapter Protocol, commands of a debugger, and places.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   read_messages(text);
   make_breakpoint(text);
   (void)Condition::parse(text, find_value);
   find_place(text);
-  (void)DebugPart::parse(text);
   return 0;
 }

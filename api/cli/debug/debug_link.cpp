@@ -1,6 +1,5 @@
 #include "api/cli/debug/debug_link.hpp"
 
-#include <charconv>
 #include <iterator>
 
 #include <fmt/format.h>
@@ -15,6 +14,8 @@ namespace plchost {
 namespace {
 
 constexpr int kAttempts = 5;
+// A host that says that its state is longer is not believed.
+constexpr std::size_t kLongestState = std::size_t{1} << 20;
 // A write waits for a moment between cycles.
 constexpr auto kWritePatience = std::chrono::seconds(10);
 
@@ -54,6 +55,10 @@ DebugRequests debug_requests(CliSession& session, const std::string& host, const
       .list_variables = [&session, host, instance](const VariableQuery& query) -> Result<VariableListing> {
         PLCHOST_TRY_ASSIGN(auto* const client, session.client());
         return client->list_variables(host, instance, query, session.deadline());
+      },
+      .read_state = [&session, host, instance](const DebugQuery& query) -> Result<DebugPart> {
+        PLCHOST_TRY_ASSIGN(auto* const client, session.client());
+        return client->read_debug(host, instance, query, session.deadline());
       }};
 }
 
@@ -79,37 +84,36 @@ Result<nlohmann::json> DebugLink::command(const std::string& text) {
   return parsed(answer);
 }
 
-Result<DebugLink::Part> DebugLink::part(std::size_t offset) {
-  auto answer = requests_.call(ControlVerb::read_debug, fmt::format("{} {}", number_, offset));
-  if (!answer && answer.error().code == ErrorCode::not_found && number_ != 0) {
+Result<DebugPart> DebugLink::part(std::size_t offset) {
+  auto part = requests_.read_state({.session = number_, .offset = offset});
+  if (!part && part.error().code == ErrorCode::not_found && number_ != 0) {
     return failure(
         ErrorCode::wrong_state,
         "the debug session is over: the process of the instance has ended, or has another application");
   }
-  PLCHOST_TRY_ASSIGN(const auto text, std::move(answer));
-  Part part;
-  const char* const last = text.data() + text.size();
-  const auto version = std::from_chars(text.data(), last, part.version);
-  if (version.ec != std::errc{} || version.ptr == last) return bad_answer(text);
-  const auto size = std::from_chars(version.ptr + 1, last, part.size);
-  if (size.ec != std::errc{} || size.ptr == last) return bad_answer(text);
-  part.text.assign(size.ptr + 1, last);
   return part;
 }
 
-// A long state comes in parts; when it changes in between it is asked for anew.
+// The contract lets a host tell its state in several pages.
+Result<std::optional<std::string>> DebugLink::whole_state() {
+  PLCHOST_TRY_ASSIGN(const auto first, part(0));
+  std::string text;
+  for (DebugPart next = first;;) {
+    if (next.version != first.version) return std::nullopt;
+    const bool fits = next.size == first.size && next.offset == text.size() && next.size <= kLongestState &&
+                      next.text.size() <= next.size - next.offset;
+    if (!fits || next.text.empty()) return bad_answer(next.text);
+    text += next.text;
+    if (text.size() == first.size) return text;
+    PLCHOST_TRY_ASSIGN(next, part(text.size()));
+  }
+}
+
 Result<nlohmann::json> DebugLink::state() {
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    PLCHOST_TRY_ASSIGN(const auto first, part(0));
-    std::string text = first.text;
-    bool whole = true;
-    while (whole && text.size() < first.size) {
-      PLCHOST_TRY_ASSIGN(const auto more, part(text.size()));
-      whole = more.version == first.version && !more.text.empty();
-      text += more.text;
-    }
-    if (!whole) continue;
-    PLCHOST_TRY_ASSIGN(auto state, parsed(text));
+    PLCHOST_TRY_ASSIGN(const auto text, whole_state());
+    if (!text) continue;
+    PLCHOST_TRY_ASSIGN(auto state, parsed(*text));
     if (state.value("too_long", false))
       return failure(ErrorCode::full, "the state of the debugger is too long to be told; delete breakpoints");
     if (number_ == 0 || state.value("session", std::uint64_t{0}) == number_) return state;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "api/cli/cli_session.hpp"
+#include "api/dds/debug_page.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/result.hpp"
 #include "shm/operations/operations.hpp"
@@ -21,6 +23,7 @@ struct DebugRequests {
   /// The text of the answer to an operation.
   std::function<Result<std::string>(ControlVerb verb, const std::string& argument)> call;
   std::function<Result<VariableListing>(const VariableQuery&)> list_variables;
+  std::function<Result<DebugPart>(const DebugQuery&)> read_state;
 };
 
 /// The same over DDS. The session outlives them.
@@ -43,6 +46,7 @@ class DebugLink {
   /// A command to the instance, without the number of the session; its answer.
   [[nodiscard]] Result<nlohmann::json> command(const std::string& text);
   /// The state, which also tells the instance that this debugger is there. wrong_state: the session is over.
+  /// corrupt: the host tells what can be none.
   [[nodiscard]] Result<nlohmann::json> state();
 
   /// The variables that a pattern names, with their values.
@@ -59,13 +63,9 @@ class DebugLink {
                                          const std::string& value);
 
  private:
-  /// The rest of a part, and what its head says.
-  struct Part {
-    std::uint64_t version = 0;
-    std::size_t size = 0;
-    std::string text;
-  };
-  [[nodiscard]] Result<Part> part(std::size_t offset);
+  [[nodiscard]] Result<DebugPart> part(std::size_t offset);
+  /// Nothing: it has changed in between.
+  [[nodiscard]] Result<std::optional<std::string>> whole_state();
 
   DebugRequests requests_;
   std::string host_;

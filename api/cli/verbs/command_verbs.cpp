@@ -90,7 +90,6 @@ void add(const Command& plcctl, CliSession& session, const Operation& operation)
     case OperationArgument::variable_value:
       return add_with_argument(verb, session, operation, "ASSIGNMENT");
     case OperationArgument::debug_command:
-    case OperationArgument::debug_part:
       return;  // "plcctl debug"
   }
 }

@@ -12,7 +12,6 @@
 #include "api/dds/topics.hpp"
 #include "shm/base/names.hpp"
 #include "shm/operations/operations.hpp"
-#include "shm/pages/debug_page.hpp"
 
 namespace plchost {
 
@@ -45,13 +44,9 @@ Result<void> check_variable_argument(const Operation& operation, std::string_vie
 
 // The instance knows its commands.
 Result<void> check_debug_argument(const Operation& operation, std::string_view argument) {
-  const bool is_part = operation.argument == Argument::debug_part;
-  const bool good =
-      is_part ? DebugPart::parse(argument).has_value() : !argument.empty() && is_printable_utf8(argument);
-  if (good) return {};
+  if (!argument.empty() && is_printable_utf8(argument)) return {};
   return failure(ErrorCode::invalid_argument,
-                 fmt::format("{}: '{}' is not of the form {}", operation.name, shown(argument),
-                             is_part ? "SESSION OFFSET" : "COMMAND"));
+                 fmt::format("{}: '{}' is not of the form COMMAND", operation.name, shown(argument)));
 }
 
 Result<void> check_argument(const Operation& operation, std::string_view argument) {
@@ -71,7 +66,6 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
       return check_name("event", argument, kMaxEventName);
     case Argument::task_or_none:
       return argument.empty() ? Result<void>() : check_name("task", argument, kMaxTaskName);
-    case Argument::debug_part:
     case Argument::debug_command:
       return check_debug_argument(operation, argument);
     case Argument::variable_or_all:

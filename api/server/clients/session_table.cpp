@@ -16,8 +16,9 @@ namespace plchost {
 namespace {
 
 // By SessionTable::Stream.
-constexpr std::array kStreamTopics{dds::kReply,   dds::kEventAck, dds::kObjectPage,  dds::kNodePage,
-                                   dds::kLogPage, dds::kEventRun, dds::kDownloadAck, dds::kVariablePage};
+constexpr std::array kStreamTopics{dds::kReply,       dds::kEventAck,     dds::kObjectPage,
+                                   dds::kNodePage,    dds::kLogPage,      dds::kEventRun,
+                                   dds::kDownloadAck, dds::kVariablePage, dds::kDebugPage};
 
 }  // namespace
 
@@ -187,6 +188,10 @@ bool SessionTable::write_page(const dds::Guid& client, const plc_LogPage& page) 
 
 bool SessionTable::write_page(const dds::Guid& client, const plc_VariablePage& page) {
   return write(client, Stream::variables, &page);
+}
+
+bool SessionTable::write_page(const dds::Guid& client, const plc_DebugPage& page) {
+  return write(client, Stream::debug, &page);
 }
 
 bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sample) {

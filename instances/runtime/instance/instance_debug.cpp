@@ -63,7 +63,7 @@ void Instance::advance_debugger() {
   const TimePoint now = MonotonicClock::now();
   host_->debug().advance(now);
   show_halts();
-  if (now < debug_shown_ + kShowPause || debug_page_->is_being_read(now)) return;
+  if (now < debug_shown_ + kShowPause) return;
   debug_shown_ = now;
   show_debug_state();
 }

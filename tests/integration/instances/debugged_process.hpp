@@ -45,24 +45,10 @@ class Debugging : public ::testing::Test {
     return reply.text;
   }
 
-  /// In parts, as a debugger reads it over DDS: anew if it changes meanwhile.
   json state() {
-    std::string text;
-    std::string version;
     for (int asked = 0; asked < 10'000; ++asked) {
-      const auto part =
-          read_debug_part(sandbox_.pool(), "line1", {.session = session_, .offset = text.size()}, 500);
-      if (!part) continue;  // it is being written
-      const auto first = part->find(' ');
-      const auto second = part->find(' ', first + 1);
-      if (part->substr(0, first) != version) {
-        const bool anew = !text.empty();
-        version = part->substr(0, first);
-        text.clear();
-        if (anew) continue;
-      }
-      text += part->substr(second + 1);
-      if (text.size() >= std::stoul(part->substr(first + 1))) return json::parse(text);
+      const auto part = read_debug_part(sandbox_.pool(), "line1", {.session = session_});
+      if (part) return json::parse(part->text);  // else it is being written
     }
     ADD_FAILURE() << "no state of the debugger";
     return {};

@@ -55,15 +55,15 @@ struct DebuggedInstance {
 
   [[nodiscard]] DebugRequests requests() {
     return {.call = [this](ControlVerb verb, const std::string& argument) { return answer(verb, argument); },
-            .list_variables = [this](const VariableQuery& query) { return list(query.patterns.front()); }};
+            .list_variables = [this](const VariableQuery& query) { return list(query.patterns.front()); },
+            .read_state = [this](const DebugQuery& /*query*/) -> Result<DebugPart> {
+              const std::string state = nlohmann::json{{"session", 1}, {"tasks", tasks}}.dump();
+              return DebugPart{.version = 1, .size = state.size(), .text = state};
+            }};
   }
 
  private:
   Result<std::string> answer(ControlVerb verb, const std::string& argument) {
-    if (verb == ControlVerb::read_debug) {
-      const std::string state = nlohmann::json{{"session", 1}, {"tasks", tasks}}.dump();
-      return fmt::format("1 {} {}", state.size(), state);
-    }
     if (verb == ControlVerb::write_variable) {
       written.push_back(argument);
       return std::string();

@@ -73,6 +73,8 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_READ_LOG), ApiRole::operating)->verb, ControlVerb::read_log);
   EXPECT_FALSE(check(make(plc_OPERATION_READ_LOG, ""), ApiRole::operating)) << "of one instance";
   EXPECT_EQ(check(make(plc_OPERATION_LIST_VARIABLES), ApiRole::viewing)->verb, ControlVerb::list_variables);
+  EXPECT_EQ(check(make(plc_OPERATION_READ_DEBUG), ApiRole::engineering)->verb, ControlVerb::read_debug);
+  EXPECT_FALSE(check(make(plc_OPERATION_READ_DEBUG, "line1", "3 500"), ApiRole::engineering)) << "text";
   for (const char* task : {"", "Main"}) {
     const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
     EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);
