@@ -7,7 +7,7 @@
 
 namespace plchost {
 
-std::vector<LogText> LogLines::add(const std::vector<plc_LogRecord>& records) {
+std::vector<LogText> LogLines::add(const std::vector<dds::Kept<plc_LogRecord>>& records) {
   // Of a manager; a stranger may write a line without an end.
   constexpr std::size_t kLongest = 65'536;
   std::vector<LogText> lines;

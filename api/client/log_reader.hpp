@@ -13,8 +13,8 @@ namespace plchost {
 
 /// A line of the log of an instance, put together from its records.
 struct LogText {
-  plc_LogRecord last{};       ///< of its records; `text` has all of them
-  std::uint64_t missing = 0;  ///< records that are missing before it
+  dds::Kept<plc_LogRecord> last{};  ///< of its records; `text` has all of them
+  std::uint64_t missing = 0;        ///< records that are missing before it
   std::string text;
 };
 
@@ -25,7 +25,7 @@ class LogLines {
   /// All up to that number was seen.
   explicit LogLines(std::uint64_t last) noexcept : last_(last) {}
   /// The lines that are whole by now, in their order.
-  [[nodiscard]] std::vector<LogText> add(const std::vector<plc_LogRecord>& records);
+  [[nodiscard]] std::vector<LogText> add(const std::vector<dds::Kept<plc_LogRecord>>& records);
 
  private:
   std::uint64_t last_ = 0;  // 0: none was seen

@@ -28,7 +28,8 @@ plc_LogRecord sample_of(const LogRecord& record) noexcept {
                        .level = std::to_underlying(record.level),
                        .source = std::to_underlying(record.source),
                        .goes_on = record.goes_on != 0,
-                       .text = {}};
+                       .text = {},
+                       .ext = {}};
   dds::copy_text(sample.text, record.text.view());
   return sample;
 }

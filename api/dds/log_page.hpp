@@ -7,6 +7,7 @@
 #include <contract_bounds.hpp>
 #include <control.h>
 
+#include "api/dds/kept_record.hpp"
 #include "api/dds/page_sample.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pages/log_ring.hpp"
@@ -30,7 +31,7 @@ struct LogListing {
   std::int64_t clock_unix_ns = 0;  ///< of the host
   bool complete = true;
   std::uint64_t next_after = 0;  ///< the next part is what comes after this number
-  std::vector<plc_LogRecord> records = {};
+  std::vector<dds::Kept<plc_LogRecord>> records = {};
 };
 
 /// The bound of a page.
@@ -43,7 +44,7 @@ inline constexpr std::size_t kPageRecords = dds::bounds::LogPage::records;
 /// A listing as it travels.
 class LogPageSample : public PageSample<plc_LogPage> {
  public:
-  /// At most kPageRecords.
+  /// At most kPageRecords. The listing outlives it.
   explicit LogPageSample(const LogListing& listing);
 
  private:

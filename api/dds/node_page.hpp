@@ -8,6 +8,7 @@
 #include <contract_bounds.hpp>
 #include <control.h>
 
+#include "api/dds/kept_record.hpp"
 #include "api/dds/page_sample.hpp"
 #include "shm/base/result.hpp"
 #include "shm/block_driver/routes.hpp"
@@ -70,8 +71,8 @@ struct NodesTold {
 
   std::string base;
   std::uint16_t host_number = 0;
-  std::vector<plc_NodeRecord> nodes;
-  std::vector<plc_RouteRecord> routes;
+  std::vector<dds::Kept<plc_NodeRecord>> nodes;
+  std::vector<dds::Kept<plc_RouteRecord>> routes;
   bool complete = true;
   std::uint16_t next_after = 0;
   std::vector<std::vector<plc_HostRange>> hosts;  ///< of the nodes, which point to them

@@ -9,6 +9,7 @@
 #include <contract_bounds.hpp>
 #include <control.h>
 
+#include "api/dds/kept_record.hpp"
 #include "api/dds/page_sample.hpp"
 #include "api/dds/text.hpp"
 #include "shm/pool/object_info.hpp"
@@ -17,7 +18,7 @@ namespace plchost {
 
 /// An object of a pool as it is shown to clients.
 struct ListedObject {
-  plc_ObjectRecord record{};  ///< but for its references
+  dds::Kept<plc_ObjectRecord> record{};  ///< but for its references
   std::vector<plc_ObjectReference> references;
 
   [[nodiscard]] std::string_view name() const noexcept { return dds::text_of(record.object_name); }
@@ -47,7 +48,7 @@ inline constexpr std::size_t kPageReferences = 1024;
 /// A listing as it travels.
 class ObjectPageSample : public PageSample<plc_ObjectPage> {
  public:
-  /// At most kPageObjects.
+  /// At most kPageObjects. The listing outlives it.
   explicit ObjectPageSample(const ObjectListing& listing);
 
  private:

@@ -58,15 +58,15 @@ Result<void> is_whole(const VariableListing& page) {
           kPageVariables));
 }
 
-VariablePageSample::VariablePageSample(VariableListing& listing) {
-  listing.variables.resize(std::min(listing.variables.size(), kPageVariables));
-  page_.stream = listing.stream;
-  page_.time_unix_ns = listing.time_unix_ns;
-  page_.time_monotonic_ns = listing.time_monotonic_ns;
-  page_.consistent = listing.consistent;
-  page_.complete = listing.complete;
-  page_.next_after = listing.next_after;
-  dds::lend(page_.variables, listing.variables);
+VariablePageSample::VariablePageSample(VariableAnswer& answer) {
+  answer.variables.resize(std::min(answer.variables.size(), kPageVariables));
+  page_.stream = answer.stream;
+  page_.time_unix_ns = answer.time_unix_ns;
+  page_.time_monotonic_ns = answer.time_monotonic_ns;
+  page_.consistent = answer.consistent;
+  page_.complete = answer.complete;
+  page_.next_after = answer.next_after;
+  dds::lend(page_.variables, answer.variables);
 }
 
 VariableListing listing_of(const plc_VariablePage& page) {

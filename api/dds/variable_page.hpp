@@ -8,6 +8,7 @@
 #include <contract_bounds.hpp>
 #include <control.h>
 
+#include "api/dds/kept_record.hpp"
 #include "api/dds/page_sample.hpp"
 #include "shm/base/result.hpp"
 
@@ -26,15 +27,21 @@ struct VariableQuery {
 [[nodiscard]] VariableQuery variable_query_of(const plc_ListPart& part);
 
 /// Variables with their values of one moment.
-struct VariableListing {
+template <class Record>
+struct VariablesOfOneMoment {
   std::uint64_t stream = 0;  ///< of the table of variables; another one: `after` means something else
   std::int64_t time_unix_ns = 0;
   std::int64_t time_monotonic_ns = 0;  ///< of the host
   bool consistent = true;              ///< no task was within a cycle
   bool complete = true;
   std::uint64_t next_after = 0;
-  std::vector<plc_VariableRecord> variables = {};
+  std::vector<Record> variables = {};
 };
+/// As a host tells them.
+using VariableAnswer = VariablesOfOneMoment<plc_VariableRecord>;
+/// As a client keeps them.
+using ListedVariable = dds::Kept<plc_VariableRecord>;
+using VariableListing = VariablesOfOneMoment<ListedVariable>;
 
 /// full: the page is not all that was asked for, so the values of the rest would be of another moment.
 [[nodiscard]] Result<void> is_whole(const VariableListing& page);
@@ -45,8 +52,8 @@ inline constexpr std::size_t kPageVariables = dds::bounds::VariablePage::variabl
 /// A listing as it travels.
 class VariablePageSample : public PageSample<plc_VariablePage> {
  public:
-  /// At most kPageVariables. The listing outlives it.
-  explicit VariablePageSample(VariableListing& listing);
+  /// At most kPageVariables. The answer outlives it.
+  explicit VariablePageSample(VariableAnswer& answer);
 };
 
 [[nodiscard]] VariableListing listing_of(const plc_VariablePage& page);

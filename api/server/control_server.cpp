@@ -464,7 +464,7 @@ void ControlServer::Parts::send(const dds::Guid& client, const Answer& answer) {
   dds::copy_text(reply.host, options.host);
   reply.code = static_cast<std::int32_t>(answer.code);
   reply.status_round = answer.status_round;
-  dds::copy_text(reply.text, answer.text);
+  dds::copy_text(reply.text, shortened(answer.text, sizeof reply.text - 1));
   sessions->write_reply(client, reply);
 }
 

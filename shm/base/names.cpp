@@ -152,6 +152,12 @@ std::string_view cut(std::string_view text, std::size_t most) noexcept {
   return text.substr(0, end);
 }
 
+std::string shortened(std::string_view text, std::size_t most) {
+  constexpr std::string_view kMore = "...";
+  if (text.size() <= most) return std::string(text);
+  return std::string(cut(text, most - std::min(most, kMore.size()))).append(kMore.substr(0, most));
+}
+
 std::string_view cut_front(std::string_view text, std::size_t most) noexcept {
   if (text.size() <= most) return text;
   text.remove_prefix(text.size() - most);

@@ -20,7 +20,7 @@ inline constexpr std::size_t kMaxEventName = 50;
 inline constexpr std::size_t kMaxObjectName = 95;
 inline constexpr std::size_t kMaxPath = 255;
 /// The argument of an operation: a path, a name, or the name and the value of a variable.
-inline constexpr std::size_t kMaxArgument = 511;
+inline constexpr std::size_t kMaxArgument = 1535;
 inline constexpr std::size_t kMaxSchedulerName = 31;
 /// All schedulers of a host, with commas between.
 inline constexpr std::size_t kMaxSchedulerList = 511;
@@ -63,6 +63,9 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 
 /// The first `most` bytes, without a torn character of UTF-8 at the end.
 [[nodiscard]] std::string_view cut(std::string_view text, std::size_t most) noexcept;
+
+/// The text; a longer one than `most` bytes is cut and says so: it ends in "...".
+[[nodiscard]] std::string shortened(std::string_view text, std::size_t most);
 
 /// The last `most` bytes, without a torn character at the beginning.
 [[nodiscard]] std::string_view cut_front(std::string_view text, std::size_t most) noexcept;

@@ -383,10 +383,7 @@ std::size_t string_room(VariableType type, std::size_t bytes) noexcept {
 }
 
 std::string variable_text(VariableType type, std::span<const std::byte> value, std::size_t most) {
-  std::string text = whole_text(type, value);
-  constexpr std::string_view kMore = "...";
-  if (text.size() <= most) return text;
-  return std::string(cut(text, most - std::min(most, kMore.size()))) + std::string(kMore.substr(0, most));
+  return shortened(whole_text(type, value), most);
 }
 
 Result<void> parse_variable(VariableType type, std::string_view text, std::span<std::byte> value) {

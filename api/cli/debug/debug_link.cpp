@@ -124,8 +124,8 @@ Result<nlohmann::json> DebugLink::state() {
   return failure(ErrorCode::busy, "the state of the debugger changes all the time; ask again");
 }
 
-Result<std::vector<plc_VariableRecord>> DebugLink::variables(const std::string& pattern) {
-  std::vector<plc_VariableRecord> all;
+Result<std::vector<ListedVariable>> DebugLink::variables(const std::string& pattern) {
+  std::vector<ListedVariable> all;
   VariableQuery query{.patterns = {pattern}, .forced = false, .after = 0};
   for (bool goes_on = true; goes_on;) {
     PLCHOST_TRY_ASSIGN(auto page, requests_.list_variables(query));
@@ -135,7 +135,7 @@ Result<std::vector<plc_VariableRecord>> DebugLink::variables(const std::string& 
   return all;
 }
 
-Result<plc_VariableRecord> DebugLink::variable(const std::string& instance, const std::string& shown_name) {
+Result<ListedVariable> DebugLink::variable(const std::string& instance, const std::string& shown_name) {
   const std::string name = asked_name(shown_name);
   if (!instance.empty()) {
     auto own = variables(fmt::format("{}.{}", instance, name));

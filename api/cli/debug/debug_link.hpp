@@ -50,10 +50,10 @@ class DebugLink {
   [[nodiscard]] Result<nlohmann::json> state();
 
   /// The variables that a pattern names, with their values.
-  [[nodiscard]] Result<std::vector<plc_VariableRecord>> variables(const std::string& pattern);
+  [[nodiscard]] Result<std::vector<ListedVariable>> variables(const std::string& pattern);
   /// The variable that a name means in a frame of `instance` (its path; empty: none): one of its own, else
   /// one by its whole name. not_found: there is none.
-  [[nodiscard]] Result<plc_VariableRecord> variable(const std::string& instance, const std::string& name);
+  [[nodiscard]] Result<ListedVariable> variable(const std::string& instance, const std::string& name);
   /// Writes the variable that a name means in a frame of `instance`; its whole name.
   [[nodiscard]] Result<std::string> write(const std::string& instance, const std::string& name,
                                           const std::string& value);

@@ -14,7 +14,7 @@ dds::Computed<plc_LogRecord, Row> computed_of(const plc_LogRecord& /*last*/, std
 }
 
 Row to_row(std::string_view host, std::string_view instance, const LogText& line) {
-  return to_row(line.last, host, instance, line);
+  return to_row(line.last.record(), host, instance, line);
 }
 
 std::string format_log_line(const LogText& line) {

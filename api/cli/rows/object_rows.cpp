@@ -80,7 +80,7 @@ dds::Computed<plc_ObjectRecord, Row> computed_of(const plc_ObjectRecord& object,
 }
 
 Row to_row(std::string_view host, const ListedObject& object) {
-  return to_row(object.record, host, object);
+  return to_row(object.record.record(), host, object);
 }
 
 Row to_short_row(std::string_view host, const ListedObject& object) {

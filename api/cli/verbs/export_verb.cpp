@@ -38,8 +38,8 @@ struct Export {
 };
 
 /// Those that the application of an instance declares: none, if it has no application, or does not tell them.
-std::vector<plc_VariableRecord> variables_of(CliSession& session, const std::string& host,
-                                             const std::string& instance, std::vector<Error>& problems) {
+std::vector<ListedVariable> variables_of(CliSession& session, const std::string& host,
+                                         const std::string& instance, std::vector<Error>& problems) {
   auto variables = VariableSampler(session, host, instance, {}).all();
   if (variables) return *std::move(variables);
   Error error = std::move(variables).error();

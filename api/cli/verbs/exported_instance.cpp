@@ -75,7 +75,7 @@ struct VariableGroup {
   std::string task;  ///< of all of them; empty: several, or any
 };
 
-std::vector<VariableGroup> groups_of(std::span<const plc_VariableRecord> variables) {
+std::vector<VariableGroup> groups_of(std::span<const ListedVariable> variables) {
   std::vector<VariableGroup> groups;
   for (const plc_VariableRecord& variable : variables) {
     const std::string_view name = dds::text_of(variable.name);
@@ -95,7 +95,7 @@ std::vector<VariableGroup> groups_of(std::span<const plc_VariableRecord> variabl
 }  // namespace
 
 ExportedInstance exported_instance(std::string_view name, std::span<const plc_TaskStatus> tasks,
-                                   std::span<const plc_VariableRecord> variables) {
+                                   std::span<const ListedVariable> variables) {
   ExportedInstance instance{.name = std::string(name), .tasks = {}, .programs = {}, .variables = {}};
   for (const plc_VariableRecord& variable : variables) instance.variables.push_back(variable_of(variable));
   const std::vector<VariableGroup> groups = groups_of(variables);

@@ -16,6 +16,6 @@ namespace plchost {
 /// word. A task without such variables gets a program that has none.
 [[nodiscard]] plcopen::ExportedInstance exported_instance(std::string_view name,
                                                           std::span<const plc_TaskStatus> tasks,
-                                                          std::span<const plc_VariableRecord> variables);
+                                                          std::span<const ListedVariable> variables);
 
 }  // namespace plchost

@@ -10,8 +10,8 @@
 
 namespace plchost {
 
-Result<std::vector<plc_VariableRecord>> VariableSampler::all() {
-  std::vector<plc_VariableRecord> variables;
+Result<std::vector<ListedVariable>> VariableSampler::all() {
+  std::vector<ListedVariable> variables;
   VariableQuery query = query_;
   for (bool goes_on = true; goes_on;) {
     PLCHOST_TRY_ASSIGN(

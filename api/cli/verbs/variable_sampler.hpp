@@ -18,7 +18,7 @@ class VariableSampler {
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
 
   /// All of them, page by page: the values of each page are of one moment.
-  [[nodiscard]] Result<std::vector<plc_VariableRecord>> all();
+  [[nodiscard]] Result<std::vector<ListedVariable>> all();
   /// All of them, with their values of one moment. full: they are more than one page holds.
   /// It is waited for until then at most.
   [[nodiscard]] Result<VariableListing> sample(TimePoint until = TimePoint::max());

@@ -46,7 +46,7 @@ Result<VariableSampler> sampler_of(CliSession& session, const VariableArguments&
 
 // Programs are told the fields as control.idl has them.
 int show_variables(const CliSession& session, const VariableSampler& sampler,
-                   const std::vector<plc_VariableRecord>& variables, std::vector<Column> columns) {
+                   const std::vector<ListedVariable>& variables, std::vector<Column> columns) {
   std::vector<Row> rows;
   for (const plc_VariableRecord& variable : variables) rows.push_back(to_row(variable, owner_of(sampler)));
   if (!session.options.json && !session.options.csv) mark_forced_arrays(rows);

@@ -151,8 +151,8 @@ Result<bool> VariableLister::go_on(Pending& pending, std::uint64_t number) {
   return true;
 }
 
-std::optional<Result<VariableListing>> VariableLister::take(Pending& pending, ValueReply reply) {
-  using Done = Result<VariableListing>;
+std::optional<Result<VariableAnswer>> VariableLister::take(Pending& pending, ValueReply reply) {
+  using Done = Result<VariableAnswer>;
   const std::uint64_t number = reply.number;
   if (reply.code == ErrorCode::wrong_state) {
     const auto renewed = renew(pending, number);
@@ -170,13 +170,13 @@ std::optional<Result<VariableListing>> VariableLister::take(Pending& pending, Va
   const ValueReply& current = pending.current ? *pending.current : none;
   const ValueReply& forced = pending.forced ? *pending.forced : none;
   const ValueReply& told = pending.current ? current : forced;
-  return Done(VariableListing{.stream = pending.table->stream(),
-                              .time_unix_ns = told.time_unix_ns,
-                              .time_monotonic_ns = told.time_monotonic_ns,
-                              .consistent = told.consistent,
-                              .complete = pending.selection.complete,
-                              .next_after = pending.selection.next_after,
-                              .variables = records_of(*pending.table, pending.selection, current, forced)});
+  return Done(VariableAnswer{.stream = pending.table->stream(),
+                             .time_unix_ns = told.time_unix_ns,
+                             .time_monotonic_ns = told.time_monotonic_ns,
+                             .consistent = told.consistent,
+                             .complete = pending.selection.complete,
+                             .next_after = pending.selection.next_after,
+                             .variables = records_of(*pending.table, pending.selection, current, forced)});
 }
 
 void VariableLister::drop(const std::string& instance, const Error& why, std::vector<Finished>& finished) {

@@ -39,7 +39,7 @@ class VariableLister {
   };
   struct Finished {
     Asker asker;
-    Result<VariableListing> listing;
+    Result<VariableAnswer> listing;
   };
 
   [[nodiscard]] static Result<VariableLister> create(std::string pool, std::string run_directory);
@@ -84,7 +84,7 @@ class VariableLister {
   [[nodiscard]] Result<void> select(Pending& pending);
   [[nodiscard]] Result<void> ask(Pending& pending, std::uint64_t number, ValueKind kind);
   /// Goes on with a reply. Nothing: it is not done yet.
-  [[nodiscard]] std::optional<Result<VariableListing>> take(Pending& pending, ValueReply reply);
+  [[nodiscard]] std::optional<Result<VariableAnswer>> take(Pending& pending, ValueReply reply);
   [[nodiscard]] Result<bool> go_on(Pending& pending, std::uint64_t number);
   [[nodiscard]] Result<void> renew(Pending& pending, std::uint64_t number);
   void take_from(const std::string& instance, std::vector<Finished>& finished);

@@ -79,6 +79,13 @@ void choose_like(Chosen& chosen, const SymbolTable& table, const std::string& pa
   }
 }
 
+// Of one value as text, with what stands around it in an array.
+std::size_t most_text(const VariableSymbol& symbol) {
+  constexpr std::size_t kAround = 4;
+  if (is_string(symbol.type)) return symbol.bytes * 3 + kAround;  // each byte may be $hh
+  return symbol.bytes <= 4 ? symbol.bytes * 5 + kAround : 40;
+}
+
 // Adds up what a page holds.
 class Page {
  public:
@@ -90,10 +97,11 @@ class Page {
     row.first = selection_.elements.size();
     row.count = row.element ? 1 : std::min<std::size_t>(symbol.elements(), kShownElements);
     const std::size_t values = row.count * symbol.bytes;
-    // A byte of a string has up to three characters.
-    const std::size_t text = std::min(kMostValueText, std::max<std::size_t>(values * 3, 40));
+    const std::size_t text = std::min(kMostValueText, row.count * most_text(symbol));
+    // A whole array has no one value that it is forced to.
+    const std::size_t texts = row.element || symbol.dimensions.empty() ? 2 : 1;
     const std::size_t bytes =
-        kRowBytes + symbol.name.size() + symbol.task.size() + symbol.area.size() + 2 * text + 80;
+        kRowBytes + symbol.name.size() + symbol.task.size() + symbol.area.size() + texts * text + 80;
     if (selection_.rows.size() == kPageVariables || bytes_ + bytes > kMostPageBytes ||
         row.first + row.count > kMaxRequestedValues || values_ + values > kMaxValueBytes) {
       return false;
@@ -150,7 +158,7 @@ std::string array_text(const VariableSymbol& symbol, const SelectedVariable& row
   std::string text = "[";
   for (std::size_t i = 0; i < row.count; ++i) {
     if (i > 0) text += ", ";
-    text += variable_text(symbol.type, values.of(row.first + i));
+    text += variable_text(symbol.type, values.of(row.first + i), kMostValueText);
     if (text.size() > kMostValueText) break;
   }
   const bool all = row.count == symbol.elements() && text.size() < kMostValueText;

@@ -113,6 +113,27 @@ TEST_F(ClientVariables, AreListedReadAndWritten) {
   EXPECT_EQ(value("grid[2,1]"), "-7");
 }
 
+TEST_F(ClientVariables, AreReadAndWrittenWholeUpToTheLongestString) {
+  std::string whole = "'" + std::string(251, 'a') + "$'$$z'";  // 254 characters
+  EXPECT_THAT(sut_.write_variable("hosta", "line1", "note", whole), HasSubstr("..."));
+  EXPECT_EQ(value("note"), whole);
+  whole[1] = 'b';
+  sut_.force_variable("hosta", "line1", "note", whole);
+  EXPECT_EQ(value("note"), whole);
+  EXPECT_THAT(forces(), ElementsAre("hosta/line1 note=" + whole));
+  const auto refusal = [&](std::size_t characters) {
+    return error_of(
+        [&] { sut_.write_variable("hosta", "line1", "note", "'" + std::string(characters, 'a') + "'"); });
+  };
+  const ClientError too_long = refusal(255);
+  EXPECT_EQ(too_long.code(), ClientError::invalid_argument);
+  EXPECT_THAT(too_long.what(), HasSubstr("a text of at most 254 bytes; this one has 255"));
+  const ClientError no_room = refusal(2000);
+  EXPECT_EQ(no_room.code(), ClientError::invalid_argument);
+  EXPECT_THAT(no_room.what(), HasSubstr("of 2007 bytes: allowed are up to 1535"));
+  EXPECT_EQ(value("note"), whole);
+}
+
 TEST_F(ClientVariables, AreForcedAndUnforced) {
   EXPECT_THAT(forces(), ElementsAre());
   sut_.force_variable("hosta", "line1", "line.total", "7");

@@ -77,11 +77,32 @@ class NextHost : public SmallHost {
     SmallHost::write_status();
   }
   bool does(const plc_Request& request, plc_Reply& reply) override {
+    if (request.operation == plc_OPERATION_READ_LOG) return write_log(request);
     if (request.operation != plc_OPERATION_BAKE) return false;
     set(reply.text, "baked " + value_in(request.ext, kRecipe));
     ++rye_.loaves;
     (void)dds_write(writer_, &rye_);
     return true;
+  }
+
+  // One line, whose record has the field more.
+  bool write_log(const plc_Request& request) {
+    plc_LogRecord line{};
+    line.sequence_number = 1;
+    line.level = 1;
+    set(line.text, "the oven is hot");
+    set_ext(line.ext, std::span(&recipe_, 1));
+    plc_LogPage page{};
+    page.related_identity = request.header.request_identity;
+    set(page.host, "next");
+    set(page.instance, "press");
+    page.epoch = page.stream = page.next_after = 1;
+    page.complete = true;
+    page.records._buffer = &line;
+    page.records._length = page.records._maximum = 1;
+    const dds_entity_t pages =
+        party().writer(plc_LogPage_desc, "plc/v1/log", {.depth = 4, .partition = reply_partition()});
+    return dds_write(pages, &page) == DDS_RETCODE_OK;
   }
 
   dds_entity_t writer_ =

@@ -2,8 +2,8 @@
 """Makes a version of the contract that comes after control.idl: next_version.py CONTROL.idl NEXT.idl
 
 It grows in each way that the head of control.idl allows. It gets a topic (RecipeStatus), an operation (OPERATION_BAKE),
-entries of `ext` ("recipe" of InstanceStatus, Request and EventPost) and a code (InstanceStatus.state 77). The last two need no
-line here.
+entries of `ext` ("recipe" of InstanceStatus, LogRecord, Request and EventPost) and a code (InstanceStatus.state 77). The last
+two need no line here.
 """
 
 import pathlib

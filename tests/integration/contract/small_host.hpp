@@ -50,6 +50,8 @@ class SmallHost {
   [[nodiscard]] plc_HostStatus& status() { return status_; }
   [[nodiscard]] plc_InstanceStatus& press() { return press_; }
   [[nodiscard]] std::string status_partition() const { return "s." + name_; }
+  /// Of the client that is being answered.
+  [[nodiscard]] const std::string& reply_partition() const { return reply_partition_; }
 
  private:
   /// The partition of the client that wrote a sample.

@@ -36,7 +36,7 @@ TEST(CheckNames, TakesRequestsUpToTheBoundOfEachField) {
             "");
   EXPECT_THAT(refusal(check_api_request({text(kMaxHostName + 1), 1, "i", ""})), HasSubstr("1 to 63"));
   EXPECT_THAT(refusal(check_api_request({"h", 1, text(kMaxInstanceName + 1), ""})), HasSubstr("1 to 31"));
-  EXPECT_THAT(refusal(check_api_request({"h", 1, "i", text(kMaxArgument + 1)})), HasSubstr("up to 511"));
+  EXPECT_THAT(refusal(check_api_request({"h", 1, "i", text(kMaxArgument + 1)})), HasSubstr("up to 1535"));
 }
 
 TEST(CheckNames, TakesARequestForTheWholeHost) {

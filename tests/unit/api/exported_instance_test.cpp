@@ -63,21 +63,21 @@ TEST(ExportedInstance, HasAProgramForEachFirstWordThatOneTaskUsesAlone) {
   const std::vector<plc_TaskStatus> tasks{
       task("line1", "fast", kCyclicKind), task("line1", "rest", kFreewheelingKind),
       task("line1", "alone", kFreewheelingKind), task("line1", "done", kExternalKind)};
-  const std::vector<plc_VariableRecord> variables{variable("grid[].x", "ARRAY [1..2] OF INT", "fast"),
-                                                  variable("limit", "INT", "fast"),
-                                                  variable("main.a", "INT", "fast"),
-                                                  variable("MAIN.b", "INT", "fast"),
-                                                  variable("rest.a", "INT", "rest"),
-                                                  variable("shared.a", "INT", "fast"),
-                                                  variable("shared.b", "INT", "rest"),
-                                                  variable("some.a", "INT")};
+  const std::vector<ListedVariable> variables{variable("grid[].x", "ARRAY [1..2] OF INT", "fast"),
+                                              variable("limit", "INT", "fast"),
+                                              variable("main.a", "INT", "fast"),
+                                              variable("MAIN.b", "INT", "fast"),
+                                              variable("rest.a", "INT", "rest"),
+                                              variable("shared.a", "INT", "fast"),
+                                              variable("shared.b", "INT", "rest"),
+                                              variable("some.a", "INT")};
   EXPECT_THAT(programs_of(exported_instance("line1", tasks, variables)),
               ElementsAre("main : main_type WITH fast", "rest : rest_type WITH ", "alone : alone_type WITH ",
                           "done_program : done_program_type WITH done"));
 }
 
 TEST(ExportedInstance, HasVariablesWithTheBoundsOfTheirArrays) {
-  const std::vector<plc_VariableRecord> variables{
+  const std::vector<ListedVariable> variables{
       variable("grid[][]", "ARRAY [1..2, -1..2] OF INT"), variable("label", "STRING[80]", "", "%QX0.1"),
       variable("pump[].blade[][].angle", "ARRAY [1..4, 0..2, 5..6] OF REAL"),
       variable("pump[].hours[]", "ARRAY [1..4, 0..9] OF STRING[8]"), variable("odd[]", "ARRAY of nothing")};

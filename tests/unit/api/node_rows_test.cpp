@@ -35,12 +35,12 @@ NodesTold routes_of(const RouteInfo& route) {
 
 TEST(RowOfANode, HasTheFieldsThatProgramsWerePromised) {
   const NodesTold told = two_nodes();
-  EXPECT_EQ(to_row(told.nodes[0], std::string_view("north"), told).dump(),
+  EXPECT_EQ(to_row(told.nodes[0].record(), std::string_view("north"), told).dump(),
             R"({"host":"north","base":"blocks","host_number":3,"node":1,"name":"gateway","pid":4711,)"
             R"("program":"plc-instance","generation":7,"forwards":true,"queue_slots":256,"hosts":"2, 5-9",)"
             R"("arrivals":12,"forwarded":0,"no_route":0,"loops":0,"duplicates":0,"congested":0,"expired":0,)"
             R"("unconnected":0,"refused":0,"lost":5})");
-  EXPECT_EQ(to_row(told.nodes[1], std::string_view("north"), told)["hosts"], "");
+  EXPECT_EQ(to_row(told.nodes[1].record(), std::string_view("north"), told)["hosts"], "");
 }
 
 TEST(RowOfARoute, HasTheFieldsThatProgramsWerePromised) {

@@ -165,7 +165,78 @@ TEST(VariableRecords, CutALongArrayAndSaySo) {
   const std::string value(dds::text_of(records[0].value));
   EXPECT_THAT(value, StartsWith("[20000, 20001, "));
   EXPECT_TRUE(value.ends_with("...")) << value;
-  EXPECT_LE(value.size(), 255U);
+  EXPECT_LE(value.size(), 1023U);
+}
+
+VariableSymbol text_of_bytes(std::string name, std::uint32_t bytes) {
+  VariableSymbol text = number(std::move(name));
+  text.type = VariableType::string;
+  text.bytes = bytes;
+  return text;
+}
+
+// The largest text of IEC 61131-3's usual STRING[254], and one of all the memory that a string may have.
+TEST(VariableRecords, ShowALongTextWholeAndSayThatALongerOneIsCut) {
+  const SymbolTable table = table_of({text_of_bytes("a", 255), text_of_bytes("b", kMaxVariableBytes)});
+  const auto selection = select_variables(table, {});
+  ASSERT_TRUE(selection);
+  ValueReply reply{.elements = selection->elements, .forced = {0, 0}, .values = {}};
+  reply.values.assign(255 + kMaxVariableBytes, std::byte{'x'});
+  reply.values[254] = std::byte{0};
+  const auto records = records_of(table, *selection, reply, reply);
+  ASSERT_EQ(records.size(), 2U);
+  const std::string whole = "'" + std::string(254, 'x') + "'";
+  EXPECT_EQ(dds::text_of(records[0].value), whole);
+  EXPECT_EQ(dds::text_of(records[0].forced_value), whole);
+  const std::string cut = "'" + std::string(1019, 'x') + "...";
+  EXPECT_EQ(dds::text_of(records[1].value), cut);
+  EXPECT_EQ(dds::text_of(records[1].forced_value), cut);
+}
+
+// The bytes of records as they travel: each text has a length and a zero, and begins at a multiple of 4.
+std::size_t bytes_of(const std::vector<plc_VariableRecord>& records) {
+  std::size_t bytes = 0;
+  const auto add = [&bytes](std::string_view text) { bytes += (4 + text.size() + 1 + 3) / 4 * 4; };
+  for (const plc_VariableRecord& record : records) {
+    add(dds::text_of(record.name));
+    add(dds::text_of(record.type));
+    add(dds::text_of(record.task));
+    add(dds::text_of(record.area));
+    add(dds::text_of(record.value));
+    add(dds::text_of(record.forced_value));
+    bytes += 8;  // truths, and the length of ext
+  }
+  return bytes;
+}
+
+// Of each type, values and arrays with much text.
+TEST(VariableRecords, FitIntoASampleWhateverTheirTypeIs) {
+  constexpr std::size_t kMostSample = std::size_t{256} * 1024;
+  for (const VariableTypeTraits& type : variable_types()) {
+    for (const std::uint32_t elements : {1U, 7U, 64U}) {
+      for (const unsigned byte : {0x00U, 0x01U, 0x80U, 0x88U, 0xffU}) {
+        std::vector<VariableSymbol> symbols;
+        const std::string end = elements > 1 ? "[]" : "";
+        for (int i = 0; i < 1100; ++i) {
+          symbols.push_back({.name = fmt::format("v{:04}{}", i, end),
+                             .type = type.type,
+                             .read_only = false,
+                             .bytes = type.bytes != 0 ? type.bytes : 20,
+                             .dimensions = {},
+                             .task = "",
+                             .area = ""});
+          if (elements > 1) symbols.back().dimensions = {{0, elements}};
+        }
+        const SymbolTable table = table_of(symbols);
+        const auto page = select_variables(table, {});
+        ASSERT_TRUE(page);
+        ValueReply reply{.elements = page->elements, .forced = {}, .values = {}};
+        reply.values.assign(page->elements.size() * symbols.front().bytes, static_cast<std::byte>(byte));
+        EXPECT_LT(bytes_of(records_of(table, *page, reply, elements > 1 ? ValueReply{} : reply)), kMostSample)
+            << type.name << " of " << elements << " elements of bytes " << byte;
+      }
+    }
+  }
 }
 
 TEST(VariableRecords, SayWhatIsForced) {

@@ -69,6 +69,13 @@ TEST(Names, CutsBetweenCharacters) {
   EXPECT_EQ(shown(std::string(1000, 'x')).size(), kShownBytes);
 }
 
+TEST(Names, SaysThatATextIsShortened) {
+  EXPECT_EQ(shortened("abcdef", 6), "abcdef");
+  EXPECT_EQ(shortened("abcdefg", 6), "abc...");
+  EXPECT_EQ(shortened("ab\xc3\xa4 defg", 6), "ab...") << "no torn character";
+  EXPECT_EQ(shortened("abcdef", 2), "..");
+}
+
 TEST(Names, OfAStrangerAreShownWithoutWhatCouldDriveATerminalOrBreakALine) {
   EXPECT_EQ(shown("\x1b[31mline1\n"), "?[31mline1?");
   EXPECT_EQ(shown("\xc3\xa4 1"), "\xc3\xa4 1") << "printable characters stay";

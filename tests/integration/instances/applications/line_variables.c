@@ -17,6 +17,9 @@ static struct {
   char label[16];
 } line = {20, 0, 0, "press"};
 static short grid[2][3] = {{10, 11, 12}, {20, 21, 22}};
+#ifdef LONG_TEXT
+static char note[255];
+#endif
 
 static void CDECL run_fast(void) {
   ++fast.count;
@@ -56,6 +59,12 @@ static void declare_all(void) {
   variable.pAddress = line.label;
   variable.dwBytes = sizeof line.label;
   plc_declare_variable(&variable);
+#ifdef LONG_TEXT
+  variable.pszName = "note";
+  variable.pAddress = note;
+  variable.dwBytes = sizeof note;
+  plc_declare_variable(&variable);
+#endif
   memset(&variable, 0, sizeof variable);
   variable.dwSize = sizeof variable;
   variable.pszName = "grid[][]";
