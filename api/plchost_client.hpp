@@ -279,8 +279,8 @@ class PLCHOST_CLIENT_API Client {
   /// The status topics of the contract by name: "task", "writer", "exception".
   static std::vector<std::string> topics();
   /// All samples of one of them, complete: each with its members by their names in the contract, in their
-  /// order there. ClientError: invalid_argument: no such topic; unsupported: the host is older than the
-  /// topic.
+  /// order there. Members that only a newer host has come last, as texts. ClientError: invalid_argument: no
+  /// such topic; unsupported: the host is older than the topic.
   std::vector<Record> status(const std::string& topic, const std::string& host = {});
 
   /// The lines of an instance, oldest first: the `newest` lines of those that the host keeps (256 KiB for

@@ -4,12 +4,15 @@
 #include <concepts>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <status_fields.hpp>
 
 #include "api/client/client_core_status.hpp"
+#include "api/dds/sequence.hpp"
+#include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -40,6 +43,12 @@ Client::Record record_of(const Sample& sample) {
   dds::visit_fields(sample, [&](const dds::FieldInfo& field, const auto& value) {
     record.emplace_back(field.name, value_of(field, value));
   });
+  // The members that a newer host has more.
+  for (const plc_KeyValue& entry : dds::parts_of(sample.ext)) {
+    std::string name(dds::text_of(entry.name));
+    if (std::ranges::find(record, name, &Client::Record::value_type::first) != record.end()) continue;
+    record.emplace_back(std::move(name), std::string(dds::text_of(entry.value)));
+  }
   return record;
 }
 

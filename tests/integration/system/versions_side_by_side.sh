@@ -61,6 +61,18 @@ plcctl --host next start instance press || fail "start"
 is "$(press_of_next)" "press running rye" || fail "instances: $(press_of_next)"
 is "$(plcctl --host next post event press/full --count 50)" "50 posted" || fail "post"
 refused "of another version" plcctl --host next list tasks
+is "$(plcctl --host next logs press --json | jq -r '.[] | [.text, .recipe] | join(": ")')" "the oven is hot: rye" ||
+  fail "a field of a record: $(plcctl --host next logs press --json)"
+if compgen -G "$BIN/../python/plchost_client*" >/dev/null; then
+  said=$(PYTHONPATH=$BIN/../python python3 -c "
+import plchost_client
+client = plchost_client.Client(domain=$PLCHOST_DOMAIN, timeout=20.0)
+record = client.status('instance', 'next')[0]
+print(record['instance'], record['state'], record['recipe'], list(record)[-1])
+print('recipe' in client.status('instance', 'cell')[0])" 2>&1) || fail "the client library: $said"
+  is "$said" "press running rye recipe
+False" || fail "the client library: $said"
+fi
 
 echo "- the first and the last version, without today's"
 said=$("$BIN/old_version" client "$PLCHOST_DOMAIN" next press full 20) || fail "old client: $said"
