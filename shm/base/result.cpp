@@ -26,9 +26,9 @@ std::string_view to_string(ErrorCode code) noexcept {
     case ErrorCode::unavailable:
       return "unavailable";
     case ErrorCode::system:
-      return "system error";
+      return "failed";
     case ErrorCode::unsupported:
-      return "not supported";
+      return "unsupported";
     case ErrorCode::full:
       return "full";
     case ErrorCode::corrupt:

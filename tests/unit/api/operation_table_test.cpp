@@ -1,10 +1,17 @@
-// The table of operations against the contract, which the build reads from control.idl.
+// The table of operations and the words of error codes against the contract, which the build reads from
+// control.idl.
+#include <algorithm>
+#include <array>
 #include <set>
 #include <string>
+#include <string_view>
+#include <utility>
 
+#include <code_words.hpp>
 #include <contract_operations.hpp>
 #include <gtest/gtest.h>
 
+#include "api/plchost_client.hpp"
 #include "api/server/access/request_check.hpp"
 #include "api/server/manager_link.hpp"
 #include "shm/operations/operations.hpp"
@@ -70,6 +77,28 @@ TEST(OperationTable, ClientsWaitUntilTheServerHasAnswered) {
   EXPECT_EQ(least_wait(operation_of(ControlVerb::stop)), kLongCommand);
   EXPECT_EQ(least_wait(operation_of(ControlVerb::restart)), kLongCommand);
   EXPECT_EQ(least_wait(operation_of(ControlVerb::start)), Duration::zero());
+}
+
+// Of the contract, of the host's texts, of the client library.
+TEST(ErrorCodes, HaveOneWordEverywhere) {
+#define OF_CLIENT(word) std::pair(ClientError::word, std::string_view(#word))
+  constexpr std::array kOfClient{
+      OF_CLIENT(invalid_argument), OF_CLIENT(not_found),   OF_CLIENT(already_exists), OF_CLIENT(wrong_state),
+      OF_CLIENT(refused),          OF_CLIENT(busy),        OF_CLIENT(timed_out),      OF_CLIENT(unavailable),
+      OF_CLIENT(failed),           OF_CLIENT(unsupported), OF_CLIENT(full),           OF_CLIENT(corrupt),
+      OF_CLIENT(wrong_type),       OF_CLIENT(wrong_size)};
+#undef OF_CLIENT
+  const auto& words = dds::words::Reply::code;
+  ASSERT_EQ(words.size(), kOfClient.size() + 1);
+  EXPECT_EQ(to_string(static_cast<ErrorCode>(words.size())), "unknown") << "the contract has all of them";
+  for (std::size_t code = 0; code < words.size(); ++code) {
+    std::string own(to_string(static_cast<ErrorCode>(code)));
+    std::ranges::replace(own, ' ', '_');
+    EXPECT_EQ(own, words[code]);
+    if (code == 0) continue;
+    EXPECT_EQ(static_cast<std::size_t>(kOfClient[code - 1].first), code);
+    EXPECT_EQ(kOfClient[code - 1].second, words[code]);
+  }
 }
 
 TEST(OperationTable, SaysWhatWasDone) {

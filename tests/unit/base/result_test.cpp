@@ -32,7 +32,7 @@ TEST(Failure, PutsTheStepBefore) {
 }
 
 TEST(ErrorCode, EachHasAName) {
-  for (unsigned code = 0; code <= static_cast<unsigned>(ErrorCode::corrupt); ++code) {
+  for (unsigned code = 0; code <= static_cast<unsigned>(ErrorCode::wrong_size); ++code) {
     EXPECT_NE(to_string(static_cast<ErrorCode>(code)), "unknown");
   }
 }
