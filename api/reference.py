@@ -18,6 +18,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "generate"))
 from contract import TAGS, Fault, meaning, parse, partition_of, qos_of, quality  # noqa: E402
 from operations import operations_of, with_operations  # noqa: E402
+from rows import words_of  # noqa: E402
 
 BEGIN = "<!-- The reference begins here. It is made: api/reference.py --write -->"
 END = "<!-- The reference ends here. -->"
@@ -46,7 +47,8 @@ def faults_of(contract, name):
                 yield f"{where} has no '{tag}:'"
         if kind.is_topic and all(kind.tags.get(tag) for tag in TAGS):
             yield from (f"{name}:{kind.line}: {fault}" for fault in faults_of_topic(contract, kind))
-        if kind.is_topic and (not kind.members or kind.members[-1].name != "ext"):
+        grows = kind.is_topic or kind.name.endswith("Record")
+        if grows and (not kind.members or kind.members[-1].name != "ext"):
             yield f"{where} does not end with ext"
         for member in kind.members:
             where = f"{name}:{member.line}: {kind.name}.{member.name}"
@@ -96,6 +98,21 @@ def changes_since(old, new):
                 yield f"type {kind.name} has {len(has)} members, had {len(was)}"
         if kind.tags.get("topic") != now.tags.get("topic"):
             yield f"type {kind.name} is of topic {now.tags.get('topic')}, was of {kind.tags.get('topic')}"
+        for tag in ("writer", "reader"):
+            if kind.tags.get(tag) != now.tags.get(tag):
+                yield f"type {kind.name}: its {tag} is '{now.tags.get(tag)}', was '{kind.tags.get(tag)}'"
+        if kind.is_topic and now.is_topic and qos_of(old, kind) != qos_of(new, now):
+            yield f"type {kind.name}: its QoS is '{quality(new, now)}', was '{quality(old, kind)}'"
+        yield from changes_of_words(kind, now)
+
+
+def changes_of_words(kind, now):
+    """A code may get a word more, behind the others."""
+    members = {member.name: member for member in now.members}
+    for member in (member for member in kind.members if member.name in members):
+        was, has = words_of(member), words_of(members[member.name])
+        if has[: len(was)] != was:
+            yield f"type {kind.name}: the codes of {member.name} are {', '.join(has) or 'without words'}, were {', '.join(was)}"
 
 
 def text_of(text):

@@ -185,6 +185,11 @@ plant_in_contract "contract: version 1 has one more member" "type EventAck: memb
 plant_in_contract "contract: an operation that its row does not have so" "control.idl is not up to date" 's/(OPERATION_STOP +=) 2;/\1 102;/'
 plant_in_contract "contract: version 1 has another code" "constant OPERATION_STOP = 2 is not what it was" 's/^(OPERATION.stop,) 2,/\1 60,/' --write
 plant_in_contract "contract: a row that nobody understands" "operations.def: a row is not understood" 's/^(OPERATION.stop,) 2,/\1 two,/'
+plant_in_contract "contract: a record that cannot grow" "LogRecord does not end with ext" '/struct LogRecord/,/^  };/{/ext;/d}'
+plant_in_contract "contract: version 1 has another QoS" "type Transition: its QoS is 'RELIABLE (1 ms), KEEP_LAST 8, TRANSIENT_LOCAL" 's/KEEP_LAST 64, TRANSIENT_LOCAL, autodispose off/KEEP_LAST 8, TRANSIENT_LOCAL, autodispose off/' --write
+plant_in_contract "contract: version 1 has another partition" "type Presence: its writer is 'host, in partition n.<host>', was" '/topic: plc.v1.presence/,/reader:/s/partition s/partition n/' --write
+plant_in_contract "contract: version 1 has another reader" "type NameClaim: its reader is 'all', was 'hosts of that name'" 's/reader: hosts of that name/reader: all/' --write
+plant_in_contract "contract: version 1 has another word for a code" "type TaskStatus: the codes of state are created, waiting, stopped, exception, were created, running" 's/0 created, 1 running, 2 stopped/0 created, 1 waiting, 2 stopped/' --write
 plant_in_contract "contract: version 1 has another topic" "type Reply is of topic plc/v1/answer, was of plc/v1/reply" 's,topic: plc/v1/reply,topic: plc/v1/answer,' --write
 
 # plant_in_picture NAME DIAGNOSTIC FILE EXPRESSION: that picture with that change (of sed)
