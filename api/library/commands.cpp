@@ -28,7 +28,7 @@ std::string text_or_throw(const Client::Outcome& outcome) {
   return outcome.text;
 }
 
-// The answers of others come as pages, and a download has contents.
+// Of those that only read, the answer is more than the text of a Reply; a download has contents.
 bool is_command(const Operation& known) {
   return known.place != OperationPlace::internal && !known.only_reads &&
          known.options != OperationOptions::download;
