@@ -28,9 +28,9 @@ const char* CDECL plc_instance_name(void);
  * Any. */
 const char* CDECL plc_parameter(const char* pszName);
 
-/* The scheduler that the application is made for: "CmpSchedule", "CmpScheduleTimer" or "CmpScheduleOneShot".
- * It is used by a fresh process if nothing else names one: the configuration of the host, `plcctl set
- * scheduler`, or TimerMode=OneShot in the settings. An online change does not use it. From plc_app_init only.
+/* The scheduler that the application is made for, one of those that `plc-instance --help` lists. It is used
+ * by a fresh process if nothing else names one: the configuration of the host, `plcctl set scheduler`, or
+ * TimerMode=OneShot in the settings. An online change does not use it. From plc_app_init only.
  * ERR_OK; ERR_PARAMETER: null, or no scheduler of that name (the log names them); ERR_DUPLICATE: named
  * already; ERR_NOTINITIALIZED. Control. */
 RTS_RESULT CDECL plc_prefer_scheduler(const char* pszScheduler);

@@ -50,7 +50,7 @@ template <class Policy>
 [[nodiscard]] std::unique_ptr<Scheduler> make_policy(const SchedulerContext& context);
 
 [[nodiscard]] std::span<const SchedulerEntry> all_schedulers() noexcept;
-/// "CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot"
+/// All of them in one text, with commas in between.
 [[nodiscard]] std::string scheduler_names();
 /// invalid_argument: no such scheduler; the text lists what there is.
 [[nodiscard]] Result<const SchedulerEntry*> find_scheduler(std::string_view name);

@@ -56,12 +56,13 @@ if [ -d instances/runtime/abi ]; then
     grep -wE "$exported" | grep -v "^instances/runtime/debug/.*${own:-no name}" &&
     fault "the lines above use what abi/ has, from a room below it" || true
 fi
-# A scheduler and a kind of task are named in one table, and in their own file.
+# A scheduler and a kind of task are named in one table, and in their own file. The settings are exempt: a file says
+# [SysTimer] TimerMode instead of a name, and each of its two values stands for a scheduler.
 registry=schedulers/policies/registry.hpp
 if [ -d schedulers/policies ]; then
   names=$(sed -nE 's/^ *PolicyName<class [A-Za-z]+>\{"([A-Za-z]+)"\},$/\1/p' "$registry" | paste -sd'|')
   [ -n "$names" ] || fault "$registry: it does not list the schedulers"
-  git grep -nE "\"($names)\"" -- "${sources[@]/%//*.[ch]pp}" ':!schedulers/policies' ':!instances/runtime/settings' &&
+  git grep -nE "\"($names)\"" -- "${sources[@]/%//*.[ch]pp}" "${sources[@]/%//*.h}" ':!schedulers/policies' ':!instances/runtime/settings' &&
     fault "the lines above name a scheduler: ask the registry or the host" || true
 fi
 git grep -nE '\bTaskKind::' -- "${sources[@]/%//*.[ch]pp}" ':!shm/base/task_kind.hpp' ':!schedulers/tasks/kinds' &&
