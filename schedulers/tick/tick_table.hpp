@@ -22,6 +22,7 @@ namespace plchost {
 /// A task that is still busy has stated nothing, so its tick passes; the task counts that itself.
 class TickTable {
  public:
+  /// The cost of a tick. Only tests read it: they hold it against the number of tasks.
   struct Work {
     std::size_t released = 0;   ///< tasks that were due
     std::size_t looked_at = 0;  ///< tasks that were touched at all
