@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Folders are layers. Each of the six folders (and tests) draws its own in its README.md, in a block ```layers. Every
-# include of the code has to follow an arrow. Usage: layers.sh [ROOT]; prints each wrong include and drawing.
+# include of the code has to follow an arrow, and every arrow is used. Usage: layers.sh [ROOT]; prints each wrong include and drawing.
 #
 #   main ─► ./ ─► a/ b/        a layer may include what lies to the right of its arrow, and what those may include
 #   * ─► shm/base/             every layer of this drawing may; a name that begins with one of the six is another house's
@@ -85,6 +85,8 @@ def included(folder, bracket, name):
     beside = os.path.normpath(f"{folder}/{name}")
     if bracket == '"' and os.path.exists(beside):
         name = beside
+    if "/" not in name:  # a header for applications and clients, which lie in one folder when they are installed
+        name = next((f"{house}/{name}" for house in HOUSES if os.path.exists(f"{house}/{name}")), name)
     return name if "/" in name and name.split("/")[0] in HOUSES else None
 
 
@@ -129,7 +131,7 @@ for house in houses:
 for layer, targets in arrows.items():
     for target in [target for target in targets if target.endswith("/...") and target not in arrows]:
         below = [name for name in arrows if name.startswith(target[:-3]) and name != layer]
-        targets.update((name, targets[target]) for name in below)
+        targets.update((name, "") for name in below)  # not each of them is used
         if below:
             del targets[target]
 for layer in [*arrows, *(target for targets in arrows.values() for target in targets)]:
@@ -142,7 +144,7 @@ if circle := find_circle():
 else:
     known = {}
     include = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
-    undrawn = set()
+    undrawn, used = set(), set()
     for house in houses:
         for folder, _, files in os.walk(house):
             for file in sorted(files):
@@ -157,8 +159,20 @@ else:
                     found = include.match(line)
                     target = found and included(folder, *found.groups())
                     there = target and layer_of(target)
-                    if there and there != here and there not in reach(here, known):
+                    if not there or there == here:
+                        continue
+                    used.add((here, there))
+                    if there not in reach(here, known):
                         faults.append(f"{path}:{number}: {here} may not include {there} ({found[2]})")
+    for layer, targets in [(layer, dict(targets)) for layer, targets in arrows.items()]:
+        for target, where in targets.items():
+            if ":" not in where or (layer, target) in used:
+                continue  # for every layer, or it is used itself
+            del arrows[layer][target]
+            known = {}
+            if all(there in reach(here, known) for here, there in used):
+                faults.append(f"{where}: no include uses the arrow {layer} ─► {target}")
+            arrows[layer][target] = where
     faults += [f"{folder}: it is not in the drawing of {folder.split('/')[0]}/README.md" for folder in sorted(undrawn)]
 if not arrows:
     faults.append("no drawing and no folder of the code was found: is this the project?")

@@ -66,6 +66,8 @@ for way in '"../pool/object_pool.hpp"' '<shm/pool/object_pool.hpp>' '"../../shm/
   must_be_red "layers: include of $way" "shm/base/planted.hpp:1: shm/base/ may not include shm/pool/" "$gates/layers.sh" "$plot/tree"
 done
 rm "$plot/tree/shm/base/planted.hpp"
+must_not_include shm/base/planted.hpp plc_app.h "shm/base/ may not include instances/ (plc_app.h)"
+must_not_include schedulers/tasks/planted.hpp schedulers/tasks/kinds/kind.hpp "schedulers/tasks/ may not include schedulers/tasks/kinds/"
 must_not_include shm/files/planted.hpp tests/support/own_name.hpp "shm/files/ may not include tests/support/own_name"
 mkdir "$plot/tree/shm/attic" && touch "$plot/tree/shm/attic/planted.hpp"
 must_be_red "layers: folder" "shm/attic: it is not in the drawing of shm/README.md" "$gates/layers.sh" "$plot/tree"
@@ -80,6 +82,7 @@ must_not_draw() {
 }
 must_not_draw "base/ ─► library/" "shm/base/ ─► shm/library/ ─► shm/pool/"
 must_not_draw "attic/ ─► base/" "shm/README.md: there is no layer shm/attic/, or no file in it"
+must_not_draw "block_driver/ ─► toml/" "no include uses the arrow shm/block_driver/ ─► shm/toml/"
 rm "$plot/tree/shm/README.md"
 must_be_red "layers: no drawing" "shm/README.md: it has no drawing of its layers" "$gates/layers.sh" "$plot/tree"
 
@@ -144,6 +147,8 @@ new_tree
 mkdir "$plot/tree/schedulers/policies" && echo '    PolicyName<class Second>{"Second"},' >"$plot/tree/schedulers/policies/registry.hpp"
 echo 'auto* name = "Second";' | tee "$plot/tree/schedulers/policies/second.cpp" >"$plot/tree/api/words.cpp" && commit_tree
 must_be_red "house: name of a scheduler" "api/words.cpp:1:auto* name" "$gates/house.sh" "$plot/tree"
+git -C "$plot/tree" mv -f api/words.cpp api/words.h
+must_be_red "house: name of a scheduler in C" "api/words.h:1:auto* name" "$gates/house.sh" "$plot/tree"
 new_tree
 mkdir "$plot/tree/schedulers/policies" && touch "$plot/tree/schedulers/policies/registry.hpp" && commit_tree
 must_be_red "house: empty registry" "schedulers/policies/registry.hpp: it does not list the schedulers" "$gates/house.sh" "$plot/tree"
