@@ -8,6 +8,7 @@
 
 #include "api/cli/debug/foreign_json.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/path_parts.hpp"
 #include "shm/base/trimmed.hpp"
 
 namespace plchost {
@@ -54,12 +55,12 @@ Result<std::string> place_in(std::string_view text, std::string_view what) {
                              shown(text), what));
 }
 
-// "PLACE hits COUNT if CONDITION log TEXT"
-Result<std::string> order_of(const std::string& place, const Json& wanted) {
+// " hits COUNT if CONDITION log TEXT"
+Result<std::string> parts_of(const Json& wanted) {
   PLCHOST_TRY_ASSIGN(const auto hits, inner_part_in(wanted, "hitCondition"));
   PLCHOST_TRY_ASSIGN(const auto condition, inner_part_in(wanted, "condition"));
   PLCHOST_TRY_ASSIGN(const auto log, part_in(wanted, "logMessage"));
-  std::string order = "break " + place;
+  std::string order;
   if (!hits.empty()) order += " hits " + hits;
   if (!condition.empty()) order += " if " + condition;
   if (!log.empty()) order += " log " + log;
@@ -69,6 +70,25 @@ Result<std::string> order_of(const std::string& place, const Json& wanted) {
 std::string last_name(std::string_view path) {
   return std::string(path.substr(path.find_last_of("/\\") + 1));
 }
+
+// As the instance is asked for a source: by the whole path, as several may have one name. It knows no path
+// with backslashes, and its words have blanks between.
+std::string asked_path(const std::string& path) {
+  return path.find_first_of("\\ ") == std::string::npos ? path : last_name(path);
+}
+
+// An order has a greatest length, and the last parts of a path tell most.
+std::string shortened(std::string_view path, std::size_t most) {
+  while (path.size() > most) {
+    const std::size_t next = path.find('/', 1);
+    if (next == std::string_view::npos) break;
+    path.remove_prefix(next);
+  }
+  return std::string(path);
+}
+
+// Of an order: the verb, the number of the session, and the number of the line, with the blanks.
+constexpr std::size_t kOrderFrame = 40;
 
 }  // namespace
 
@@ -180,11 +200,19 @@ Result<void> DapSession::remove_of(const std::string& key) {
 }
 
 Json DapSession::set_one(const std::string& key, const Result<std::string>& place, const Json& wanted) {
-  const auto order = place ? order_of(*place, wanted) : place;
-  const auto answer = order ? link_.command(*order) : Result<Json>(std::unexpected(order.error()));
+  const auto parts = parts_of(wanted);
+  const auto& checked = place ? parts : place;
+  if (!checked) return {{"verified", false}, {"message", checked.error().describe()}};
+  const std::int64_t line = number_in(wanted, "line");
+  const bool in_file = key != kFunctions;
+  const std::size_t room = kMaxArgument - std::min(kMaxArgument, kOrderFrame + parts->size());
+  const std::string whole = in_file ? fmt::format("{}:{}", shortened(*place, room), line) : *place;
+  const auto answer = link_.command(fmt::format("break {}{}", whole, *parts));
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
   ids_[key].push_back(id);
+  if (const auto file = answer->value("file", ""); sources_.contains(key) && !file.empty())
+    paths_[file] = key;
   if (const auto remark = answer->value("remark", ""); !remark.empty()) tell("important", remark);
   return {{"verified", true}, {"id", id}, {"line", answer->value("line", 0)}};
 }
@@ -196,14 +224,10 @@ DapSession::Answer DapSession::set_breakpoints(const Json& arguments) {
   const std::string path = whole.empty() ? text_in(source, "name") : whole;
   if (path.empty()) return failure(ErrorCode::invalid_argument, "the source has no path and no name");
   PLCHOST_TRY(remove_of(path));
-  if (!whole.empty()) paths_[last_name(whole)] = whole;
-  const auto file = place_in(last_name(path), "a file");
+  if (!whole.empty()) sources_.insert(whole);
+  const auto file = place_in(asked_path(path), "a file");
   Json made = Json::array();
-  for (const Json& wanted : list_in(arguments, "breakpoints")) {
-    made.push_back(set_one(
-        path, file ? Result<std::string>(fmt::format("{}:{}", *file, number_in(wanted, "line"))) : file,
-        wanted));
-  }
+  for (const Json& wanted : list_in(arguments, "breakpoints")) made.push_back(set_one(path, file, wanted));
   return Json{{"breakpoints", std::move(made)}};
 }
 
@@ -229,6 +253,21 @@ Result<std::string> DapSession::task_of(const Json& arguments) {
                  fmt::format("no thread {}: there are 1 to {}", thread, tasks_.size()));
 }
 
+// A source in which a breakpoint was set is that file. Others are the file that they agree with most.
+std::string DapSession::path_of(const std::string& file) const {
+  if (const auto known = paths_.find(file); known != paths_.end()) return known->second;
+  std::size_t most = 0;
+  std::string best = file;
+  for (const std::string& path : sources_) {
+    if (std::ranges::any_of(paths_, [&](const auto& entry) { return entry.second == path; })) continue;
+    const std::size_t common =
+        std::max(common_last_parts(file, path), std::size_t{last_name(file) == last_name(path)});
+    if (common > most) best = path;
+    most = std::max(most, common);
+  }
+  return best;
+}
+
 DapSession::Answer DapSession::stack(const Json& arguments) {
   PLCHOST_TRY_ASSIGN(const auto name, task_of(arguments));
   PLCHOST_TRY_ASSIGN(state_, link_.state());
@@ -237,15 +276,11 @@ DapSession::Answer DapSession::stack(const Json& arguments) {
   const Json* const task = task_in(state_, name);
   for (const Json& frame : task == nullptr ? Json::array() : task->value("stack", Json::array())) {
     const std::string file = frame.value("file", "");
-    const std::string name_of_file = last_name(file);
-    const auto of_client = paths_.find(name_of_file);
-    frames.push_back(
-        {{"id", thread * kFramesOfThread + static_cast<std::int64_t>(frames.size())},
-         {"name", frame.value("pou", "")},
-         {"line", frame.value("line", 0)},
-         {"column", 1},
-         {"source",
-          {{"name", name_of_file}, {"path", of_client == paths_.end() ? file : of_client->second}}}});
+    frames.push_back({{"id", thread * kFramesOfThread + static_cast<std::int64_t>(frames.size())},
+                      {"name", frame.value("pou", "")},
+                      {"line", frame.value("line", 0)},
+                      {"column", 1},
+                      {"source", {{"name", last_name(file)}, {"path", path_of(file)}}}});
   }
   const std::size_t total = frames.size();
   return Json{{"stackFrames", std::move(frames)}, {"totalFrames", total}};

@@ -67,6 +67,8 @@ class DapSession {
   [[nodiscard]] Answer written_local(std::int64_t frame, const std::string& name, const std::string& value);
   [[nodiscard]] Result<std::string> task_of(const Json& arguments);
   [[nodiscard]] std::int64_t thread_of(const std::string& task) const;
+  /// The path that the client has for a file of the instance; the file itself: none is known.
+  [[nodiscard]] std::string path_of(const std::string& file) const;
   /// Also by the number of its local variables; an empty object: there is none.
   [[nodiscard]] Json frame_at(std::int64_t number) const;
   void event(const std::string& name, Json body);
@@ -82,7 +84,8 @@ class DapSession {
   std::vector<std::string> tasks_;  // thread 1 is the first
   DebugNews news_;
   std::set<std::string> halted_;                           // as the client was told
-  std::map<std::string, std::string> paths_;               // of the client, by the last part
+  std::set<std::string> sources_;                          // paths of the client
+  std::map<std::string, std::string> paths_;               // of those, by the file of their breakpoints
   std::map<std::string, std::vector<std::uint32_t>> ids_;  // breakpoints by source, or "" of functions
 };
 

@@ -11,6 +11,7 @@
 #include "instances/runtime/debug/debug_value.hpp"
 #include "instances/runtime/debug/debug_words.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/path_parts.hpp"
 #include "shm/log/log.hpp"
 #include "shm/variables/variable_symbol.hpp"
 
@@ -81,6 +82,14 @@ bool ascend(std::span<const std::uint32_t> lines) noexcept {
 
 std::string_view last_name(std::string_view path) noexcept {
   return path.substr(path.find_last_of('/') + 1);
+}
+
+// How well a declared file is the one that is asked for; 0: it is not. A whole path may be that of another
+// machine, or of another folder. A part of a path must agree as far as it goes.
+std::size_t agreement(std::string_view declared, std::string_view asked) noexcept {
+  const std::size_t common = common_last_parts(declared, asked);
+  const bool is_part = common == std::min(path_parts(declared), path_parts(asked));
+  return is_part || asked.starts_with('/') ? common : 0;
 }
 
 }  // namespace
@@ -204,22 +213,21 @@ Result<PouLine> PouCollection::find(std::string_view place) const {
                  fmt::format("no POU '{}'; there are: {}", shown(name), join_some(names)));
 }
 
-// A POU that holds the line goes before one that only begins behind it.
+// The file that agrees most. A POU that holds the line goes before one that only begins behind it.
 Result<PouLine> PouCollection::find_in_file(std::string_view file, std::uint32_t line) const {
   std::optional<PouLine> best;
   std::uint32_t distance = std::numeric_limits<std::uint32_t>::max();
-  bool known = false;
-  for (std::uint32_t pou = 0; pou < pous_.size(); ++pou) {
-    const bool whole = file.find('/') != std::string_view::npos;
-    if ((whole ? std::string_view(pous_[pou].file) : last_name(pous_[pou].file)) != file) continue;
-    known = true;
+  std::size_t most = 0;
+  for (const DeclaredPou& pou : pous_) most = std::max(most, agreement(pou.file, file));
+  for (std::uint32_t pou = 0; most > 0 && pou < pous_.size(); ++pou) {
+    if (agreement(pous_[pou].file, file) != most) continue;
     const auto found = pous_[pou].line_from(line);
     if (!found || *found - line >= distance) continue;
     distance = *found - line;
     best = PouLine{.pou = pou, .line = *found};
   }
   if (best) return *best;
-  if (known) {
+  if (most > 0) {
     return failure(ErrorCode::not_found,
                    fmt::format("'{}' has no statement from line {} on", shown(file), line));
   }

@@ -76,7 +76,8 @@ class PouCollection {
   [[nodiscard]] std::vector<PouInstance> instances_of(std::uint32_t pou) const;
 
   /// The statement at or behind a place: "POU:LINE", "FILE:LINE", or "POU", its first one. The file may be
-  /// given by its last name alone. not_found: there is no such POU or file, or no statement from that line
+  /// given by the last parts of its path. Of a whole path the file counts that has most last parts of it, at
+  /// least its name. not_found: there is no such POU or file, or no statement from that line
   /// on; the text lists what there is. invalid_argument: it is no place.
   [[nodiscard]] Result<PouLine> find(std::string_view place) const;
 

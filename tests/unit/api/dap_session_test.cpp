@@ -164,6 +164,49 @@ TEST_F(DapSessionTest, ShowsASourceByThePathThatItsClientHasForIt) {
   EXPECT_EQ(shown_path(), "/src/a.st") << "an editor opens only a whole path";
 }
 
+class DapSources : public DapSessionTest {
+ protected:
+  DapSources() {
+    instance_.halt("fast", 1,
+                   json::array({{{"pou", "Cap"}, {"line", 2}, {"file", "b/same.st"}},
+                                {{"pou", "Fill"}, {"line", 2}, {"file", "a/same.st"}}}));
+  }
+  void set(const std::string& path, const json& breakpoint) {
+    (void)ask("setBreakpoints", {{"source", {{"path", path}}}, {"breakpoints", json::array({breakpoint})}});
+  }
+  std::vector<std::string> paths() {
+    std::vector<std::string> all;
+    const json body = ask("stackTrace", {{"threadId", 1}});
+    for (const json& frame : body["stackFrames"]) all.push_back(frame["source"]["path"]);
+    return all;
+  }
+};
+
+TEST_F(DapSources, OfOneNameAreToldApartByTheirWholePaths) {
+  set("/src/b/same.st", {{"line", 2}});
+  EXPECT_THAT(instance_.commands, ElementsAre("break /src/b/same.st:2"));
+  set("/src/a/same.st", {{"line", 2}});
+  EXPECT_THAT(paths(), ElementsAre("/src/b/same.st", "/src/a/same.st"));
+}
+
+TEST_F(DapSources, AreThoseInWhichTheInstanceSetsTheirBreakpoints) {
+  instance_.file = "b/same.st";
+  set("/moved/same.st", {{"line", 2}});
+  EXPECT_THAT(paths(), ElementsAre("/moved/same.st", "a/same.st"));
+}
+
+TEST_F(DapSources, WithLongPathsAreAskedForByTheLastParts) {
+  const std::string folder(200, 'f');
+  set("/" + folder + "/b/same.st",
+      {{"line", 2}, {"logMessage", std::string(200, 'x')}, {"condition", std::string(200, 'y')}});
+  EXPECT_THAT(instance_.commands.back(), testing::StartsWith("break /b/same.st:2 if y"));
+}
+
+TEST_F(DapSources, OfOtherSystemsAreAskedForByTheirNames) {
+  set("C:\\src\\same.st", {{"line", 2}});
+  EXPECT_THAT(instance_.commands, ElementsAre("break same.st:2"));
+}
+
 TEST_F(DapSessionTest, KeepsBreakpointsThatTheInstanceDoesNotDelete) {
   const auto set = [&](const json& breakpoints) {
     return answer("setBreakpoints", {{"source", {{"path", "/src/a.st"}}}, {"breakpoints", breakpoints}});

@@ -31,6 +31,7 @@ struct DebuggedInstance {
   std::vector<std::string> commands;  ///< that came, without the number of the session
   std::vector<std::string> written;   ///< NAME=VALUE
   bool busy = false;                  ///< it refuses commands
+  std::string file;                   ///< in which it sets breakpoints; empty: it does not say
 
   /// Each variable to the value that it has; of arrays some elements.
   void force_all() {
@@ -71,7 +72,7 @@ struct DebuggedInstance {
     if (argument.starts_with("attach")) return std::string(R"({"session":1})");
     if (busy) return failure(ErrorCode::busy, "it is busy");
     commands.push_back(argument.substr(argument.find(' ') + 1));
-    return std::string(R"({"id":1,"line":7})");
+    return nlohmann::json{{"id", 1}, {"line", 7}, {"file", file}}.dump();
   }
 
   // "PATH.*", or a whole name; that of an array is without its brackets.

@@ -51,6 +51,26 @@ TEST_F(DeclaredPous, AreFoundByNameAndByFile) {
     EXPECT_FALSE(sut.find(place)) << place;
 }
 
+TEST_F(DeclaredPous, OfFilesOfOneNameAreFoundByTheirFolders) {
+  ASSERT_EQ(declare("Fill", "a/same.st", {2, 9}), ERR_OK);
+  ASSERT_EQ(declare("Cap", "b/same.st", {3, 7}), ERR_OK);
+  EXPECT_EQ(sut.find("b/same.st:2").value(), (PouLine{1, 3}));
+  EXPECT_EQ(sut.find("/src/b/same.st:2").value(), (PouLine{1, 3}));
+  EXPECT_EQ(sut.find("/src/a/same.st:3").value(), (PouLine{0, 9}));
+  EXPECT_THAT(sut.find("/src/b/same.st:8").error().message, HasSubstr("no statement from line 8"))
+      << "the other file has one";
+  EXPECT_EQ(sut.find("/src/same.st:3").value(), (PouLine{1, 3})) << "by its name alone";
+  EXPECT_THAT(sut.find("c/same.st:3").error().message, HasSubstr("no POU or file"));
+}
+
+TEST_F(DeclaredPous, OfAWholePathAreFoundByItsLastParts) {
+  ASSERT_EQ(declare("Fill", "/build/a/same.st", {2}), ERR_OK);
+  ASSERT_EQ(declare("Cap", "/build/b/same.st", {2}), ERR_OK);
+  EXPECT_EQ(sut.find("b/same.st:2").value(), (PouLine{1, 2}));
+  EXPECT_EQ(sut.find("/moved/b/same.st:2").value(), (PouLine{1, 2}));
+  EXPECT_EQ(sut.find("/build/a/same.st:2").value(), (PouLine{0, 2}));
+}
+
 TEST_F(DeclaredPous, AreRefused) {
   EXPECT_EQ(sut.declare(nullptr), ERR_PARAMETER);
   EXPECT_EQ(declare("", "a.st", {1}), ERR_PARAMETER);
