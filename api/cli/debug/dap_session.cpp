@@ -46,13 +46,13 @@ Result<std::string> inner_part_in(const Json& wanted, const char* key) {
   return text;
 }
 
-// The words of a command have blanks between, so its place can have none.
-Result<std::string> place_in(std::string_view text, std::string_view what) {
+// The words of a command have blanks between, so the name of a POU can have none.
+Result<std::string> pou_in(std::string_view text) {
   std::string place(trimmed(text));
   if (!place.empty() && place.find(' ') == std::string::npos && is_printable_utf8(place)) return place;
   return failure(ErrorCode::invalid_argument,
-                 fmt::format("'{}' is no name of {}, which is one word of characters that can be printed",
-                             shown(text), what));
+                 fmt::format("'{}' is no name of a POU, which is one word of characters that can be printed",
+                             shown(text)));
 }
 
 // " hits COUNT if CONDITION log TEXT"
@@ -72,9 +72,23 @@ std::string last_name(std::string_view path) {
 }
 
 // As the instance is asked for a source: by the whole path, as several may have one name. It knows no path
-// with backslashes, and its words have blanks between.
+// with backslashes.
 std::string asked_path(const std::string& path) {
-  return path.find_first_of("\\ ") == std::string::npos ? path : last_name(path);
+  return path.find('\\') == std::string::npos ? path : last_name(path);
+}
+
+Result<std::string> file_in(const std::string& path) {
+  if (!path.empty() && is_printable_utf8(path) && path.find('"') == std::string::npos) return path;
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is no name of a file, which has characters that can be printed and no "
+                             "quotation marks",
+                             shown(path)));
+}
+
+// Blanks end a place that has no quotation marks.
+std::string file_place(std::string_view file, std::int64_t line) {
+  if (file.find(' ') == std::string_view::npos) return fmt::format("{}:{}", file, line);
+  return fmt::format("\"{}\":{}", file, line);
 }
 
 // An order has a greatest length, and the last parts of a path tell most.
@@ -87,7 +101,8 @@ std::string shortened(std::string_view path, std::size_t most) {
   return std::string(path);
 }
 
-// Of an order: the verb, the number of the session, and the number of the line, with the blanks.
+// Of an order: the verb, the number of the session, and the number of the line, with blanks and quotation
+// marks.
 constexpr std::size_t kOrderFrame = 40;
 
 }  // namespace
@@ -206,7 +221,7 @@ Json DapSession::set_one(const std::string& key, const Result<std::string>& plac
   const std::int64_t line = number_in(wanted, "line");
   const bool in_file = key != kFunctions;
   const std::size_t room = kMaxArgument - std::min(kMaxArgument, kOrderFrame + parts->size());
-  const std::string whole = in_file ? fmt::format("{}:{}", shortened(*place, room), line) : *place;
+  const std::string whole = in_file ? file_place(shortened(*place, room), line) : *place;
   const auto answer = link_.command(fmt::format("break {}{}", whole, *parts));
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
@@ -225,7 +240,7 @@ DapSession::Answer DapSession::set_breakpoints(const Json& arguments) {
   if (path.empty()) return failure(ErrorCode::invalid_argument, "the source has no path and no name");
   PLCHOST_TRY(remove_of(path));
   if (!whole.empty()) sources_.insert(whole);
-  const auto file = place_in(asked_path(path), "a file");
+  const auto file = file_in(asked_path(path));
   Json made = Json::array();
   for (const Json& wanted : list_in(arguments, "breakpoints")) made.push_back(set_one(path, file, wanted));
   return Json{{"breakpoints", std::move(made)}};
@@ -235,7 +250,7 @@ DapSession::Answer DapSession::set_function_breakpoints(const Json& arguments) {
   PLCHOST_TRY(remove_of(kFunctions));
   Json made = Json::array();
   for (const Json& wanted : list_in(arguments, "breakpoints"))
-    made.push_back(set_one(kFunctions, place_in(text_in(wanted, "name"), "a POU"), wanted));
+    made.push_back(set_one(kFunctions, pou_in(text_in(wanted, "name")), wanted));
   return Json{{"breakpoints", std::move(made)}};
 }
 

@@ -27,7 +27,7 @@ constexpr double kWaitSeconds = 10;
 
 constexpr std::array kCommands = {
     "break PLACE [hits COUNT] [if CONDITION] [log TEXT]",
-    "  PLACE is POU:LINE, FILE:LINE or POU. COUNT is =N, %N or >=N.",
+    "  PLACE is POU:LINE, FILE:LINE or POU; \"MY FILE\":LINE with blanks. COUNT is =N, %N or >=N.",
     "delete ID|*             list                        tasks",
     "continue [TASK|*]       pause [TASK|*]              wait [SECONDS]",
     "step [TASK]             next [TASK]                 out [TASK]          until PLACE",

@@ -53,6 +53,11 @@ bool HitRule::holds(std::uint64_t hit) const noexcept {
 Result<BreakpointOrder> BreakpointOrder::parse(std::string_view text) {
   BreakpointOrder order;
   text = trimmed(text);
+  const std::string_view whole = text;
+  const std::size_t quoted = quoted_size(text);
+  // Words in a quoted place are none of the order.
+  const std::string plain = quoted == 0 ? std::string() : fmt::format("PLACE{}", text.substr(quoted));
+  if (quoted > 0) text = plain;
   // The last part may hold the words of the others.
   const auto cut = [&text](std::string_view word) {
     const std::string wanted = fmt::format(" {} ", word);
@@ -72,13 +77,13 @@ Result<BreakpointOrder> BreakpointOrder::parse(std::string_view text) {
     order.*member = part;
     shorten(part);
   }
-  order.place = text;
-  if (!order.place.empty() && text.find(' ') == std::string_view::npos) return order;
+  order.place = quoted == 0 ? text : without_quotes(whole.substr(0, quoted));
+  const bool is_open = quoted == 0 && whole.starts_with('"');
+  if (!order.place.empty() && !is_open && text.find(' ') == std::string_view::npos) return order;
   return bad_order(
       fmt::format("'{}' is no breakpoint: PLACE [hits COUNT] [if CONDITION] [log TEXT] is; PLACE is "
-                  "POU:LINE, FILE:LINE or "
-                  "POU",
-                  shown(text)));
+                  "POU:LINE, FILE:LINE or POU; a FILE with blanks stands in quotation marks",
+                  shown(whole)));
 }
 
 Result<LogTemplate> LogTemplate::parse(std::string_view text, const FindValue& find) {

@@ -31,9 +31,10 @@ struct HitRule {
 };
 
 /// A breakpoint as a client asks for it:
-/// "PLACE [hits RULE] [if CONDITION] [log TEXT]", the parts in this order.
+/// "PLACE [hits RULE] [if CONDITION] [log TEXT]", the parts in this order. A file with blanks in its name
+/// stands in quotation marks: "a file.st":7.
 struct BreakpointOrder {
-  std::string place;
+  std::string place;  ///< without the marks
   std::string hits = {};
   std::string condition = {};
   std::string log = {};  ///< with "{NAME}" for values; empty: it halts

@@ -150,7 +150,7 @@ Result<StepRule> DebugService::rule_of(std::string_view verb, std::string_view p
   if (verb == "next") rule.kind = StepRule::Kind::over;
   if (verb == "out") rule.kind = StepRule::Kind::out;
   if (verb == "until") {
-    PLCHOST_TRY_ASSIGN(const auto line, program_.pous().find(place));
+    PLCHOST_TRY_ASSIGN(const auto line, program_.pous().find(without_quotes(place)));
     rule.kind = StepRule::Kind::until;
     rule.pou = line.pou;
     rule.line = line.line;

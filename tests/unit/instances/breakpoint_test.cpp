@@ -174,6 +174,19 @@ TEST(BreakpointOrders, HaveTheirPartsInOrder) {
     EXPECT_FALSE(BreakpointOrder::parse(wrong)) << wrong;
 }
 
+TEST(BreakpointOrders, HaveFilesWithBlanksInQuotationMarks) {
+  const auto order = BreakpointOrder::parse(R"("my log line.st":7 hits %2 log at {a})").value();
+  EXPECT_EQ(order.place, "my log line.st:7");
+  EXPECT_EQ(order.hits, "%2");
+  EXPECT_EQ(order.log, "at {a}");
+  EXPECT_EQ(BreakpointOrder::parse(R"("/a b/c if d.st":7)").value().place, "/a b/c if d.st:7");
+  EXPECT_EQ(BreakpointOrder::parse(R"("a b.st:7" if c)").value().place, "a b.st:7");
+  for (const char* const wrong :
+       {"\"a b.st:7", "\"", "\"\"", "\"a b.st\":7 8", "\"a b.st\" :7", "x \"a b.st\":7"})
+    EXPECT_FALSE(BreakpointOrder::parse(wrong)) << wrong;
+  EXPECT_THAT(BreakpointOrder::parse("a b.st:7").error().message, HasSubstr("stands in quotation marks"));
+}
+
 TEST_F(BreakpointConditions, AreNoLogTemplates) {
   const FindValue find = [this](std::string_view name) { return this->find(name); };
   const auto made = LogTemplate::parse("speed {speed} of { limit }!", find).value();
