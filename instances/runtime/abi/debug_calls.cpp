@@ -50,6 +50,8 @@ void plc_debug_enter(Plc_Frame* pFrame) {
 
 void plc_debug_leave(Plc_Frame* pFrame) {
   top_frame = pFrame->pCaller;
+  if (__builtin_expect(__atomic_load_n(&plc_debug_armed, __ATOMIC_RELAXED) == 0, 1)) return;
+  if (DebugTask* const task = task_here()) task->leave(*pFrame);
 }
 
 void plc_debug_statement(Plc_Frame* pFrame) {

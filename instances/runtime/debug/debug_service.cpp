@@ -141,14 +141,10 @@ Result<std::vector<std::size_t>> DebugService::tasks_named(std::string_view name
 
 Result<StepRule> DebugService::rule_of(std::string_view verb, std::string_view place,
                                        const DebugTask::Halt& halt) const {
-  StepRule rule{.kind = StepRule::Kind::none,
-                .cycle = halt.cycle,
-                .depth = halt.frame->dwDepth,
-                .line = halt.frame->dwLine,
-                .pou = halt.frame->pPou->dwNumber};
+  StepRule rule = StepRule::over(*halt.frame, halt.cycle);
+  if (verb == "continue") rule.kind = StepRule::Kind::none;
   if (verb == "step") rule.kind = StepRule::Kind::into;
-  if (verb == "next") rule.kind = StepRule::Kind::over;
-  if (verb == "out") rule.kind = StepRule::Kind::out;
+  if (verb == "out") rule.leaves(*halt.frame);
   if (verb == "until") {
     PLCHOST_TRY_ASSIGN(const auto line, program_.pous().find(without_quotes(place)));
     rule.kind = StepRule::Kind::until;

@@ -35,6 +35,10 @@ class DebugTask {
 
   /// The task's thread comes to a statement. Real-time unless it halts.
   void statement(Plc_Frame& frame, std::uint64_t cycle) noexcept;
+  /// A call of the task's thread returns. Real-time.
+  void leave(const Plc_Frame& frame) noexcept {
+    if (steps()) step_.leaves(frame);
+  }
 
   // All that follows: the control thread.
   [[nodiscard]] Task& task() const noexcept { return task_; }
@@ -88,7 +92,7 @@ class DebugTask {
   std::atomic<bool> pause_{false};
   std::atomic<bool> ignored_{false};
   std::atomic<bool> stepping_{false};
-  StepRule step_;                         // written by the control thread while the task halts
+  StepRule step_;                         // written by the control thread while the task halts, else its own
   std::atomic<std::uint32_t> gate_{0};    // the thread sleeps on it: it changes when the task may go on
   std::atomic<std::uint64_t> halted_{0};  // the gate on which it sleeps, and 1; 0: it does not halt
   Halt halt_;

@@ -11,15 +11,29 @@ struct StepRule {
   enum class Kind : std::uint8_t {
     none,
     into,   ///< at the next statement
-    over,   ///< at the next statement of this call, or of a caller
-    out,    ///< at the next statement of a caller
+    over,   ///< at the next statement of `call`
     until,  ///< at that line of that POU
   };
   Kind kind = Kind::none;
-  std::uint64_t cycle = 0;  ///< in which it began
-  std::uint32_t depth = 0;  ///< of calls, where it began
-  std::uint32_t line = 0;   ///< the statement where it began; until: the line
-  std::uint32_t pou = 0;    ///< the same
+  std::uint64_t cycle = 0;          ///< in which it began
+  const Plc_Frame* call = nullptr;  ///< where it began, or a caller; null: it ends with the cycle
+  std::uint32_t line = 0;           ///< the statement where it began, 0: in another call; until: the line
+  std::uint32_t pou = 0;            ///< the same
+
+  /// The step of "next" from a statement.
+  [[nodiscard]] static StepRule over(const Plc_Frame& from, std::uint64_t in_cycle) noexcept {
+    return {.kind = Kind::over,
+            .cycle = in_cycle,
+            .call = &from,
+            .line = from.dwLine,
+            .pou = from.pPou->dwNumber};
+  }
+  /// A call returns. Its caller takes its place: another call may lie at the same address. Real-time.
+  void leaves(const Plc_Frame& frame) noexcept {
+    if (&frame != call || kind == Kind::until) return;
+    call = frame.pCaller;
+    line = 0;
+  }
 
   /// Whether to halt at this statement. A cycle that has ended is the return of all calls. Several statements
   /// of one line are one step. Real-time.
@@ -31,11 +45,9 @@ struct StepRule {
       case Kind::until:
         return same_line;
       case Kind::into:
-        return in_cycle != cycle || frame.dwDepth != depth || !same_line;
+        return in_cycle != cycle || &frame != call || !same_line;
       case Kind::over:
-        return in_cycle != cycle || frame.dwDepth < depth || (frame.dwDepth == depth && !same_line);
-      case Kind::out:
-        return in_cycle != cycle || frame.dwDepth < depth;
+        return in_cycle != cycle || (&frame == call && !same_line);
     }
     return false;
   }

@@ -132,6 +132,53 @@ TEST_P(DebuggedText, IsSteppedIntoOverAndOutOf) {
   EXPECT_TRUE(goes_on("Main"));
 }
 
+constexpr const char* kSums = R"(FUNCTION Twice : INT
+  VAR_INPUT x : INT; END_VAR
+  Twice := x * 2;
+END_FUNCTION
+
+FUNCTION Again : INT
+  VAR_INPUT x : INT; END_VAR
+  Again := Twice(x);
+END_FUNCTION
+
+PROGRAM Press
+  VAR sum : INT; i : INT; cells : ARRAY[1..5] OF INT; END_VAR
+  sum := Again(1) + Again(2);
+  FOR i := 1 TO 5 DO
+    cells[i] := sum;
+  END_FOR;
+  sum := 0; sum := sum + i;
+  i := 0;
+END_PROGRAM
+
+CONFIGURATION cell
+  RESOURCE line ON PLC
+    TASK Main (INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM press1 WITH Main : Press;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(DebuggedText, IsSteppedOverToItsCallerAndToNoOtherCall) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kSums));
+  command("break Twice:3");  // compilers choose which call is the first
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  command("delete *");
+  EXPECT_EQ(stack("Main"), "Twice:3 Again:8 Press:13");
+  EXPECT_EQ(stack_after("next"), "Press:14") << "the other calls of this line are neither";
+}
+
+TEST_P(DebuggedText, IsSteppedIntoTheNextCallOfItsLine) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kSums));
+  command("break Twice:3");  // compilers choose which call is the first
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  command("delete *");
+  EXPECT_EQ(stack_after("step"), "Again:8 Press:13");
+  EXPECT_EQ(stack_after("step"), "Twice:3 Again:8 Press:13");
+  EXPECT_EQ(stack_after("out"), "Press:14");
+}
+
 constexpr const char* kScale = R"(TYPE
   Mode : (idle, busy, late);
   Place : STRUCT x : INT; far : BOOL; END_STRUCT;

@@ -231,30 +231,54 @@ TEST(BreakpointTables, FindTheBreakpointsOfAStatement) {
 
 class StepRules : public testing::Test {
  protected:
-  [[nodiscard]] bool halts(StepRule::Kind kind, std::uint32_t depth, unsigned line, std::uint64_t cycle = 5) {
-    const StepRule rule{.kind = kind, .cycle = 5, .depth = 1, .line = 10, .pou = 0};
-    const Plc_Frame frame{&pou_, nullptr, line, depth, nullptr, nullptr, 0, 0};
+  StepRules() {
+    inner_.pCaller = &begin_;
+    begin_.pCaller = &outer_;
+  }
+  static bool halts(StepRule rule, Plc_Frame& frame, unsigned line, std::uint64_t cycle = 5) {
+    frame.dwLine = line;
     return rule.halts_at(frame, cycle);
   }
+  StepRule rule(StepRule::Kind kind) {
+    begin_.dwLine = 10;
+    StepRule made = StepRule::over(begin_, 5);
+    made.kind = kind;
+    return made;
+  }
   Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0, nullptr, 0};
+  Plc_Frame outer_{&pou_, nullptr, 0, 0, nullptr, nullptr, 0, 0};
+  Plc_Frame begin_{&pou_, nullptr, 0, 1, nullptr, nullptr, 0, 0};
+  Plc_Frame inner_{&pou_, nullptr, 0, 2, nullptr, nullptr, 0, 0};
 };
 
 TEST_F(StepRules, HaltWhereTheySay) {
   using Kind = StepRule::Kind;
-  EXPECT_FALSE(halts(Kind::none, 1, 11));
-  EXPECT_TRUE(halts(Kind::into, 1, 11));
-  EXPECT_TRUE(halts(Kind::into, 2, 10));
-  EXPECT_FALSE(halts(Kind::into, 1, 10));  // another statement of the same line
-  EXPECT_TRUE(halts(Kind::into, 1, 10, 6));
-  EXPECT_TRUE(halts(Kind::over, 1, 11));
-  EXPECT_FALSE(halts(Kind::over, 2, 11));
-  EXPECT_TRUE(halts(Kind::over, 0, 3));
-  EXPECT_TRUE(halts(Kind::over, 2, 11, 6));  // all calls of the cycle have returned
-  EXPECT_FALSE(halts(Kind::out, 1, 11));
-  EXPECT_TRUE(halts(Kind::out, 0, 11));
-  EXPECT_TRUE(halts(Kind::out, 1, 11, 6));
-  EXPECT_TRUE(halts(Kind::until, 4, 10));
-  EXPECT_FALSE(halts(Kind::until, 1, 11));
+  EXPECT_FALSE(halts(rule(Kind::none), begin_, 11));
+  EXPECT_TRUE(halts(rule(Kind::into), begin_, 11));
+  EXPECT_TRUE(halts(rule(Kind::into), inner_, 10));
+  EXPECT_FALSE(halts(rule(Kind::into), begin_, 10)) << "another statement of the same line";
+  EXPECT_TRUE(halts(rule(Kind::into), begin_, 10, 6));
+  EXPECT_TRUE(halts(rule(Kind::over), begin_, 11));
+  EXPECT_FALSE(halts(rule(Kind::over), inner_, 11));
+  EXPECT_TRUE(halts(rule(Kind::over), inner_, 11, 6)) << "all calls of the cycle have returned";
+  EXPECT_TRUE(halts(rule(Kind::until), inner_, 10));
+  EXPECT_FALSE(halts(rule(Kind::until), begin_, 11));
+}
+
+TEST_F(StepRules, MeanTheCallerWhenTheirCallHasReturned) {
+  StepRule over = rule(StepRule::Kind::over);
+  over.leaves(inner_);
+  EXPECT_TRUE(halts(over, begin_, 11)) << "that was another call";
+  over.leaves(begin_);
+  EXPECT_FALSE(halts(over, begin_, 11)) << "another call at the same address";
+  EXPECT_TRUE(halts(over, outer_, 10)) << "in the same line, too";
+  over.leaves(outer_);
+  EXPECT_FALSE(halts(over, outer_, 3));
+  EXPECT_TRUE(halts(over, outer_, 3, 6));
+
+  StepRule into = rule(StepRule::Kind::into);
+  into.leaves(begin_);
+  EXPECT_TRUE(halts(into, begin_, 10)) << "another call of the same function in the same line";
 }
 
 TEST(DebugNumbers, OfDatesAreNanosecondsInEachForm) {
