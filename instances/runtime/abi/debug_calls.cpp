@@ -55,5 +55,6 @@ void plc_debug_leave(Plc_Frame* pFrame) {
 }
 
 void plc_debug_statement(Plc_Frame* pFrame) {
-  if (DebugTask* const task = task_here()) task->statement(*pFrame, cycle_number);
+  if (DebugTask* const task = task_here())
+    task->statement(*pFrame, __builtin_return_address(0), cycle_number);
 }

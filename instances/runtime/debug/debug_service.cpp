@@ -141,7 +141,7 @@ Result<std::vector<std::size_t>> DebugService::tasks_named(std::string_view name
 
 Result<StepRule> DebugService::rule_of(std::string_view verb, std::string_view place,
                                        const DebugTask::Halt& halt) const {
-  StepRule rule = StepRule::over(*halt.frame, halt.cycle);
+  StepRule rule = StepRule::over(*halt.frame, halt.marker, halt.cycle);
   if (verb == "continue") rule.kind = StepRule::Kind::none;
   if (verb == "step") rule.kind = StepRule::Kind::into;
   if (verb == "out") rule.leaves(*halt.frame);

@@ -8,13 +8,21 @@
 
 namespace plchost {
 
-void DebugTask::statement(Plc_Frame& frame, std::uint64_t cycle) noexcept {
+void DebugTask::statement(Plc_Frame& frame, const void* marker, std::uint64_t cycle) noexcept {
   if (FaultTrap::here() != &task_.trap()) return;  // an event variable is read
   if (ignored() || board_.suspended.load(std::memory_order_acquire)) return;
   const std::uint32_t breakpoint = look_at_breakpoints(frame);
-  if (breakpoint != 0) return stop_here(frame, cycle, HaltReason::breakpoint, breakpoint);
-  if (pause_.load(std::memory_order_relaxed)) return stop_here(frame, cycle, HaltReason::pause, 0);
-  if (steps() && step_.halts_at(frame, cycle)) return stop_here(frame, cycle, HaltReason::step, 0);
+  const auto stop = [&](HaltReason reason) {
+    stop_here({.frame = &frame,
+               .marker = marker,
+               .cycle = cycle,
+               .reason = reason,
+               .breakpoint = breakpoint,
+               .number = halts() + 1});
+  };
+  if (breakpoint != 0) return stop(HaltReason::breakpoint);
+  if (pause_.load(std::memory_order_relaxed)) return stop(HaltReason::pause);
+  if (steps() && step_.halts_at(frame, marker, cycle)) return stop(HaltReason::step);
 }
 
 // The id of the first that halts here; 0: none.
@@ -58,11 +66,9 @@ void DebugTask::take_logs(const std::function<void(const LogHit&)>& with) {
   }
 }
 
-void DebugTask::stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReason reason,
-                          std::uint32_t breakpoint) noexcept {
-  const std::uint64_t number = halts() + 1;
-  halt_ = {.frame = &frame, .cycle = cycle, .reason = reason, .breakpoint = breakpoint, .number = number};
-  halts_.store(number, std::memory_order_relaxed);
+void DebugTask::stop_here(const Halt& halt) noexcept {
+  halt_ = halt;
+  halts_.store(halt.number, std::memory_order_relaxed);
   (void)forget_steps();
   const std::uint32_t gate = gate_.load(std::memory_order_relaxed);
   const TimePoint from = MonotonicClock::now();

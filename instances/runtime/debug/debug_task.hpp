@@ -33,8 +33,9 @@ class DebugTask {
   /// Both outlive it.
   DebugTask(Task& task, DebugBoard& board) noexcept : task_(task), board_(board) {}
 
-  /// The task's thread comes to a statement. Real-time unless it halts.
-  void statement(Plc_Frame& frame, std::uint64_t cycle) noexcept;
+  /// The task's thread comes to a statement. `marker`: the place in the code from which this is called, which
+  /// tells statements of one line apart. Real-time unless it halts.
+  void statement(Plc_Frame& frame, const void* marker, std::uint64_t cycle) noexcept;
   /// A call of the task's thread returns. Real-time.
   void leave(const Plc_Frame& frame) noexcept {
     if (steps()) step_.leaves(frame);
@@ -57,6 +58,7 @@ class DebugTask {
   /// Where it halts: valid until it is let go.
   struct Halt {
     const Plc_Frame* frame = nullptr;
+    const void* marker = nullptr;  ///< of the statement
     std::uint64_t cycle = 0;
     HaltReason reason{};
     std::uint32_t breakpoint = 0;  ///< its id
@@ -84,8 +86,7 @@ class DebugTask {
  private:
   [[nodiscard]] std::uint32_t look_at_breakpoints(const Plc_Frame& frame) noexcept;
   void note(const Breakpoint& breakpoint, const Plc_Frame& frame) noexcept;
-  void stop_here(const Plc_Frame& frame, std::uint64_t cycle, HaltReason reason,
-                 std::uint32_t breakpoint) noexcept;
+  void stop_here(const Halt& halt) noexcept;
 
   Task& task_;
   DebugBoard& board_;

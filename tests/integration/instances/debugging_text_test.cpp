@@ -179,6 +179,19 @@ TEST_P(DebuggedText, IsSteppedIntoTheNextCallOfItsLine) {
   EXPECT_EQ(stack_after("out"), "Press:14");
 }
 
+TEST_P(DebuggedText, IsSteppedThroughEachRunOfALoop) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kSums));
+  command("break Press:14");
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  command("delete *");
+  for (const char* const run : {"1", "2", "3", "4", "5"}) {
+    EXPECT_EQ(stack_after(*run == '2' ? "step" : "next"), "Press:15");
+    EXPECT_EQ(values_->read("press1.i"), run);
+  }
+  EXPECT_EQ(stack_after("next"), "Press:17");
+  EXPECT_EQ(stack_after("next"), "Press:18") << "the statements of one line are one step";
+}
+
 constexpr const char* kScale = R"(TYPE
   Mode : (idle, busy, late);
   Place : STRUCT x : INT; far : BOOL; END_STRUCT;

@@ -235,16 +235,22 @@ class StepRules : public testing::Test {
     inner_.pCaller = &begin_;
     begin_.pCaller = &outer_;
   }
-  static bool halts(StepRule rule, Plc_Frame& frame, unsigned line, std::uint64_t cycle = 5) {
+  bool halts(StepRule rule, Plc_Frame& frame, unsigned line, std::uint64_t cycle = 5) {
+    return halts_at(rule, frame, line, &another_marker_, cycle);
+  }
+  static bool halts_at(StepRule rule, Plc_Frame& frame, unsigned line, const char* marker,
+                       std::uint64_t cycle = 5) {
     frame.dwLine = line;
-    return rule.halts_at(frame, cycle);
+    return rule.halts_at(frame, marker, cycle);
   }
   StepRule rule(StepRule::Kind kind) {
     begin_.dwLine = 10;
-    StepRule made = StepRule::over(begin_, 5);
+    StepRule made = StepRule::over(begin_, &marker_, 5);
     made.kind = kind;
     return made;
   }
+  char marker_ = 0;
+  char another_marker_ = 0;
   Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0, nullptr, 0};
   Plc_Frame outer_{&pou_, nullptr, 0, 0, nullptr, nullptr, 0, 0};
   Plc_Frame begin_{&pou_, nullptr, 0, 1, nullptr, nullptr, 0, 0};
@@ -263,6 +269,15 @@ TEST_F(StepRules, HaltWhereTheySay) {
   EXPECT_TRUE(halts(rule(Kind::over), inner_, 11, 6)) << "all calls of the cycle have returned";
   EXPECT_TRUE(halts(rule(Kind::until), inner_, 10));
   EXPECT_FALSE(halts(rule(Kind::until), begin_, 11));
+}
+
+TEST_F(StepRules, HaltAtTheNextRunOfTheirStatement) {
+  using Kind = StepRule::Kind;
+  for (const Kind kind : {Kind::over, Kind::into}) {
+    EXPECT_TRUE(halts_at(rule(kind), begin_, 10, &marker_)) << "the next run of a loop";
+    EXPECT_FALSE(halts_at(rule(kind), begin_, 10, &another_marker_));
+  }
+  EXPECT_FALSE(halts_at(rule(Kind::over), inner_, 10, &marker_)) << "a call of itself";
 }
 
 TEST_F(StepRules, MeanTheCallerWhenTheirCallHasReturned) {
