@@ -40,6 +40,12 @@ Json locals_of(const Plc_Frame& frame, const DeclaredPou& pou) {
   return locals;
 }
 
+// In steps: a state that changes all the time cannot be read in parts.
+Duration time_of(const DebugTask::Halt& halt) {
+  constexpr auto kStep = std::chrono::milliseconds(100);
+  return (MonotonicClock::now() - halt.since) / kStep * kStep;
+}
+
 /// How much of a stack is told.
 struct StackDetail {
   std::size_t frames = 0;
@@ -105,8 +111,13 @@ nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frame
   Json one{{"task", name_of(number)}, {"state", halt ? "halted" : task.ignored() ? "ignored" : "runs"}};
   if (task.halts() > 0) {
     one["halts"] = task.halts();
-    one["halted_ms"] = task.halted_for() / std::chrono::milliseconds(1);
-    one["releases_halted"] = task.task().releases_passed();
+    const Duration going_on = halt ? time_of(*halt) : Duration();
+    one["halted_ms"] = (task.halted_for() + going_on) / std::chrono::milliseconds(1);
+    // The task itself counts the releases at the end of the cycle.
+    const Duration interval = halt ? task.task().interval_in_force() : Duration();
+    const std::uint64_t passed =
+        interval > Duration() ? static_cast<std::uint64_t>((halt->before + going_on) / interval) : 0;
+    one["releases_halted"] = task.task().releases_passed() + passed;
   }
   if (!halt && (task.is_to_pause() || task.steps())) one["state"] = "steps";
   if (!halt) return one;

@@ -1,6 +1,7 @@
 #include "instances/runtime/debug/debug_task.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <unistd.h>
 
@@ -67,11 +68,14 @@ void DebugTask::take_logs(const std::function<void(const LogHit&)>& with) {
 }
 
 void DebugTask::stop_here(const Halt& halt) noexcept {
+  const TimePoint from = MonotonicClock::now();
+  if (std::exchange(halted_cycle_, halt.cycle) != halt.cycle) halted_in_cycle_ = {};
   halt_ = halt;
+  halt_.since = from;
+  halt_.before = halted_in_cycle_;
   halts_.store(halt.number, std::memory_order_relaxed);
   (void)forget_steps();
   const std::uint32_t gate = gate_.load(std::memory_order_relaxed);
-  const TimePoint from = MonotonicClock::now();
   task_.stand_still([this, gate] {
     if (board_.suspended.load(std::memory_order_acquire)) return;
     halted_.store(std::uint64_t{gate} + 1, std::memory_order_release);
@@ -84,7 +88,9 @@ void DebugTask::stop_here(const Halt& halt) noexcept {
     while (is_held()) futex_wait(&gate_, gate);
     halted_.store(0, std::memory_order_relaxed);
   });
-  halted_ns_.fetch_add((MonotonicClock::now() - from).count(), std::memory_order_relaxed);
+  const Duration halted = MonotonicClock::now() - from;
+  halted_in_cycle_ += halted;
+  halted_ns_.fetch_add(halted.count(), std::memory_order_relaxed);
 }
 
 std::optional<DebugTask::Halt> DebugTask::halt() const noexcept {

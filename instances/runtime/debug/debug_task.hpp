@@ -63,6 +63,8 @@ class DebugTask {
     HaltReason reason{};
     std::uint32_t breakpoint = 0;  ///< its id
     std::uint64_t number = 0;      ///< of the halts of this task, from 1
+    TimePoint since{};
+    Duration before{};  ///< earlier halts of the same cycle
   };
   /// Nothing: it does not halt.
   [[nodiscard]] std::optional<Halt> halt() const noexcept;
@@ -72,6 +74,7 @@ class DebugTask {
   /// It goes on, if it was let go or the tasks are suspended.
   void rouse() noexcept;
   [[nodiscard]] std::uint64_t halts() const noexcept { return halts_.load(std::memory_order_relaxed); }
+  /// In all halts that are over.
   [[nodiscard]] Duration halted_for() const noexcept {
     return Duration(halted_ns_.load(std::memory_order_relaxed));
   }
@@ -97,6 +100,8 @@ class DebugTask {
   std::atomic<std::uint32_t> gate_{0};    // the thread sleeps on it: it changes when the task may go on
   std::atomic<std::uint64_t> halted_{0};  // the gate on which it sleeps, and 1; 0: it does not halt
   Halt halt_;
+  std::uint64_t halted_cycle_ = 0;  // of the last halt; the thread's own
+  Duration halted_in_cycle_{};
   std::atomic<std::uint64_t> halts_{0};
   std::atomic<std::int64_t> halted_ns_{0};
   TableHold<BreakpointTable> table_;

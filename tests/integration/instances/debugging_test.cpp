@@ -183,6 +183,17 @@ TEST_F(DebuggingByHand, CountsReleasesOfAHaltAsNoLostCycles) {
   EXPECT_LT(process_->task("Main")->counters.exec_max_ns, longest + 300'000'000);
 }
 
+TEST_F(DebuggingByHand, TellsTheTimeOfAHaltThatGoesOn) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  EXPECT_TRUE(eventually([&] {
+    const json main = task("Main");
+    return main.value("halted_ms", 0) >= 300 && main.value("releases_halted", 0) >= 30;
+  })) << state().dump(2);
+  EXPECT_EQ(task("Main").value("halts", 0), 1);
+}
+
 TEST_F(DebuggingByHand, HaltsAllTasksIfItIsSaid) {
   attach();
   command("halts all");
