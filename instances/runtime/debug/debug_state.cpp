@@ -104,11 +104,18 @@ constexpr std::array kDetails{
 
 }  // namespace
 
+std::string_view DebugService::state_text(const DebugTask& task) const noexcept {
+  if (suspended_) return "stopped";
+  if (task.halt()) return "halted";
+  if (task.is_to_pause() || task.steps()) return "steps";
+  return task.ignored() ? "ignored" : "runs";
+}
+
 nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frames,
                                            std::size_t with_locals) const {
   const DebugTask& task = *tasks_[number];
   const auto halt = task.halt();
-  Json one{{"task", name_of(number)}, {"state", halt ? "halted" : task.ignored() ? "ignored" : "runs"}};
+  Json one{{"task", name_of(number)}, {"state", state_text(task)}};
   if (task.halts() > 0) {
     one["halts"] = task.halts();
     const Duration going_on = halt ? time_of(*halt) : Duration();
@@ -119,7 +126,6 @@ nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frame
         interval > Duration() ? static_cast<std::uint64_t>((halt->before + going_on) / interval) : 0;
     one["releases_halted"] = task.task().releases_passed() + passed;
   }
-  if (!halt && (task.is_to_pause() || task.steps())) one["state"] = "steps";
   if (!halt) return one;
   one["halt"] = halt->number;
   one["reason"] = reason_text(halt->reason);

@@ -80,7 +80,9 @@ void Instance::show_halts() noexcept {
 }
 
 void Instance::let_tasks_go(std::string_view why) {
-  if (has_debugger()) let_go_ += host_->debug().suspend(why);
+  if (!has_debugger()) return;
+  let_go_ += host_->debug().suspend(why);
+  show_debug_state();  // before the reply
 }
 
 void Instance::let_tasks_go_on(std::string_view why) {

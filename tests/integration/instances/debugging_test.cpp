@@ -280,7 +280,10 @@ TEST_F(DebuggingByHand, StopsAndStartsAHaltedTask) {
   const ControlReply stopped = process_->ask(ControlVerb::stop);
   EXPECT_EQ(stopped.code, ErrorCode::ok) << stopped.text;
   EXPECT_THAT(stopped.text, HasSubstr("1 halted tasks were let go first"));
+  for (const char* const name : {"Main", "Other", "Edge"})
+    EXPECT_EQ(task(name).value("state", ""), "stopped") << "with the reply";
   EXPECT_EQ(process_->ask(ControlVerb::start).code, ErrorCode::ok);
+  EXPECT_NE(task("Other").value("state", ""), "stopped") << "with the reply";
   EXPECT_TRUE(halts("Main"));
   EXPECT_EQ(process_->end(SIGTERM), 0);
 }
