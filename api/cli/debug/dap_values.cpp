@@ -155,9 +155,10 @@ DapSession::Answer DapSession::evaluated(const Json& frame, const std::string& n
                                          const std::string& context) {
   PLCHOST_TRY_ASSIGN(const auto* const local, local_in(frame, name));
   if (local != nullptr) return local_json(*local);
-  PLCHOST_TRY_ASSIGN(const auto variable, link_.variable(frame.value("instance", ""), name));
-  Json made = variable_json(variable, "");
-  if (context == "clipboard") made["value"] = dds::text_of(variable.value);
+  const auto variable = link_.variable(frame.value("instance", ""), name);
+  if (!variable) return std::unexpected(error_in_frame(frame, variable.error()));
+  Json made = variable_json(*variable, "");
+  if (context == "clipboard") made["value"] = dds::text_of(variable->value);
   return made;
 }
 

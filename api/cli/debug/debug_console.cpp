@@ -245,8 +245,9 @@ Result<void> DebugConsole::print(const std::string& name) {
     print_local(*local);
     return {};
   }
-  PLCHOST_TRY_ASSIGN(const auto one, link_.variable(frame.value("instance", ""), name));
-  print_variable(one);
+  const auto one = link_.variable(frame.value("instance", ""), name);
+  if (!one) return std::unexpected(error_in_frame(frame, one.error()));
+  print_variable(*one);
   return {};
 }
 

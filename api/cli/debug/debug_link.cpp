@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "api/cli/debug/debug_state.hpp"
 #include "api/cli/debug/foreign_json.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/variable_page.hpp"
@@ -141,8 +142,18 @@ Result<ListedVariable> DebugLink::variable(const std::string& instance, const st
     auto own = variables(fmt::format("{}.{}", instance, name));
     if (own && own->size() == 1) return own->front();
   }
-  PLCHOST_TRY_ASSIGN(const auto found, variables(name));
-  if (found.size() == 1) return found.front();
+  const auto found = variables(name);
+  if (found && found->size() == 1) return found->front();
+  if (!found && found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
+  std::vector<std::string> wholes{name};
+  if (!instance.empty()) wholes.insert(wholes.begin(), fmt::format("{}.{}", instance, name));
+  for (const std::string& whole : wholes) {
+    const auto members = variables(whole + ".*");
+    if (!members || members->empty()) continue;
+    std::vector<std::string> names;
+    for (const auto& member : *members) names.emplace_back(dds::text_of(member.name));
+    return std::unexpected(error_of_structure(name, names));
+  }
   return failure(ErrorCode::not_found, fmt::format("no variable '{}' in '{}'", shown(name),
                                                    instance.empty() ? instance_ : instance));
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,8 +17,14 @@ namespace plchost {
 [[nodiscard]] const nlohmann::json* task_in(const nlohmann::json& state, std::string_view name);
 
 /// The local variable that a name means in a frame: its name, type and value. Null: the frame has none. full:
-/// the state was too long to tell them.
+/// the state was too long to tell them. invalid_argument: it is a structure.
 [[nodiscard]] Result<const nlohmann::json*> local_in(const nlohmann::json& frame, std::string_view name);
+
+/// That a name means a structure or function block, which has no value of its own.
+[[nodiscard]] Error error_of_structure(std::string_view name, std::span<const std::string> members);
+
+/// The error of a name that means nothing in a frame. It says which local variables a frame does not show.
+[[nodiscard]] Error error_in_frame(const nlohmann::json& frame, Error error);
 
 /// News in the states of a debugger: each halt and each line of a log point, once.
 class DebugNews {
