@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstdio>
+#include <string>
+#include <utility>
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -24,6 +26,8 @@ namespace {
 constexpr auto kStateLook = std::chrono::milliseconds(30);
 // A client that reads nothing for so long is left.
 constexpr int kSendPatienceMs = 2000;
+// One that sends no request for so long is none.
+constexpr auto kFirstRequest = std::chrono::seconds(5);
 
 Result<UniqueFd> listen_on(std::uint16_t port, std::uint16_t& got) {
   UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -43,19 +47,62 @@ Result<UniqueFd> listen_on(std::uint16_t port, std::uint16_t& got) {
   return fd;
 }
 
+// Tells a client that its connection ends.
+std::string farewell(const Error& error) {
+  const auto event = [](const char* name, nlohmann::json body) {
+    return dap_packet({{"seq", 0}, {"type", "event"}, {"event", name}, {"body", std::move(body)}});
+  };
+  return event("output", {{"category", "stderr"}, {"output", error.describe() + "\n"}}) +
+         event("terminated", nlohmann::json::object());
+}
+
+/// Clients that come while another one is served.
+class RefusedClients {
+ public:
+  explicit RefusedClients(int listener) noexcept : listener_(listener) {}
+
+  // One of them stays until it has read why, and leaves. If its bytes were not read, it would lose the text.
+  void look() {
+    std::array<char, 4096> bytes{};
+    if (client_ && ::recv(client_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT) == 0) client_ = UniqueFd();
+    pollfd ready{.fd = listener_, .events = POLLIN, .revents = 0};
+    if (::poll(&ready, 1, 0) <= 0) return;
+    client_ = UniqueFd(::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!client_) return;
+    const std::string text = farewell(
+        {.code = ErrorCode::busy,
+         .system_errno = 0,
+         .message = "another client is connected, and one is served at a time: disconnect it first"});
+    (void)::send(client_.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    (void)::shutdown(client_.get(), SHUT_WR);
+  }
+
+ private:
+  int listener_;
+  UniqueFd client_;
+};
+
 /// One client.
 class Connection {
  public:
-  Connection(int fd, DebugLink& link, bool take)
-      : fd_(fd), session_(link, [this](const nlohmann::json& message) { send(message); }, take) {}
+  Connection(int fd, RefusedClients& others, DebugLink& link, bool take)
+      : fd_(fd),
+        others_(others),
+        session_(link, [this](const nlohmann::json& message) { send(message); }, take) {}
 
   // Until it leaves, or something is wrong with it.
   Result<void> serve() {
     TimePoint next_look;
+    const TimePoint latest_request = MonotonicClock::now() + kFirstRequest;
     while (!over_ && !interrupted()) {
       PLCHOST_TRY_ASSIGN(const bool more, receive());
       if (!more) return {};
+      others_.look();
       const TimePoint now = MonotonicClock::now();
+      if (!has_asked_ && now >= latest_request) {
+        return failure(ErrorCode::timed_out, fmt::format("it has sent no request for {} s",
+                                                         kFirstRequest / std::chrono::seconds(1)));
+      }
       if (now < next_look) continue;
       next_look = now + kStateLook;
       // A state that changes all the time is looked at again.
@@ -64,13 +111,7 @@ class Connection {
     return {};
   }
 
-  void tell(const Error& error) {
-    send({{"seq", 0},
-          {"type", "event"},
-          {"event", "output"},
-          {"body", {{"category", "stderr"}, {"output", error.describe() + "\n"}}}});
-    send({{"seq", 0}, {"type", "event"}, {"event", "terminated"}, {"body", nlohmann::json::object()}});
-  }
+  void tell(const Error& error) { send_packet(farewell(error)); }
 
  private:
   // False: the client has left.
@@ -85,12 +126,14 @@ class Connection {
     for (;;) {
       PLCHOST_TRY_ASSIGN(const auto message, reader_.next());
       if (!message) return true;
+      has_asked_ = true;
       if (!session_.obey(*message)) return false;
     }
   }
 
-  void send(const nlohmann::json& message) {
-    const std::string packet = dap_packet(message);
+  void send(const nlohmann::json& message) { send_packet(dap_packet(message)); }
+
+  void send_packet(const std::string& packet) {
     for (std::size_t sent = 0; sent < packet.size() && !over_;) {
       pollfd ready{.fd = fd_, .events = POLLOUT, .revents = 0};
       const bool writable = ::poll(&ready, 1, kSendPatienceMs) > 0;
@@ -103,7 +146,9 @@ class Connection {
   }
 
   int fd_;
+  RefusedClients& others_;
   bool over_ = false;
+  bool has_asked_ = false;
   DapReader reader_;
   DapSession session_;
 };
@@ -116,12 +161,13 @@ Result<void> serve_dap(DebugLink& link, std::uint16_t port, bool take) {
   catch_interrupts();
   fmt::print("Debug Adapter Protocol for {} on 127.0.0.1:{}\n", link.instance(), got);
   std::fflush(stdout);
+  RefusedClients others(listener.get());
   while (!interrupted()) {
     pollfd ready{.fd = listener.get(), .events = POLLIN, .revents = 0};
     if (::poll(&ready, 1, static_cast<int>(kInterruptLook / std::chrono::milliseconds(1))) <= 0) continue;
     const UniqueFd client(::accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC));
     if (!client) continue;
-    Connection connection(client.get(), link, take);
+    Connection connection(client.get(), others, link, take);
     Result<void> served;
     try {
       served = connection.serve();

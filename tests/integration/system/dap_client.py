@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A client of the Debug Adapter Protocol for the stories: dap_client.py PORT story|garbage|vanish, PORT vscode PACKAGE_JSON,
+"""A client of the Debug Adapter Protocol for the stories: dap_client.py PORT story|garbage|second|vanish, PORT vscode PACKAGE_JSON,
 or PORT text SOURCE"""
 import json
 import socket
@@ -210,6 +210,32 @@ def text(port, source):
     client.ask("disconnect")
 
 
+def second(port):
+    """Beside a client, and beside a connection that sends nothing."""
+    first = attached(port)
+    refused(port)
+    assert first.ask("threads")["threads"], "the first one is served as before"
+    first.ask("disconnect")
+    silent = Client(port)
+    refused(port)
+    left = silent.event("output")
+    assert "no request for 5 s" in left["output"], left
+    silent.event("terminated")
+    attached(port).ask("disconnect")
+
+
+def refused(port):
+    client = Client(port)
+    client.socket.sendall(b"Content-Length: 2\r\n\r\n{}")
+    told = client.event("output")
+    assert "another client is connected" in told["output"], told
+    client.event("terminated")
+    try:
+        assert not client.receive()
+    except EOFError:
+        client.socket.close()
+
+
 def vanish(port):
     client = attached(port)
     client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Main"}])
@@ -217,4 +243,4 @@ def vanish(port):
     client.socket.close()
 
 
-{"story": story, "garbage": garbage, "vanish": vanish, "vscode": vscode, "text": text}[sys.argv[2]](int(sys.argv[1]), *sys.argv[3:])
+{"story": story, "garbage": garbage, "vanish": vanish, "second": second, "vscode": vscode, "text": text}[sys.argv[2]](int(sys.argv[1]), *sys.argv[3:])

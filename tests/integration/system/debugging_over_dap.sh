@@ -39,6 +39,9 @@ echo "- garbage on the port ends that connection, and nothing else"
 python3 "$(dirname "$0")/dap_client.py" "$port" garbage || fail "garbage"
 python3 "$(dirname "$0")/dap_client.py" "$port" story || fail "the story after garbage"
 
+echo "- a second client is told why it is refused, and a silent one is left"
+python3 "$(dirname "$0")/dap_client.py" "$port" second || fail "second"
+
 echo "- VS Code with its extension: a breakpoint halts all tasks"
 extension=$(dirname "$0")/../../../instances/debugging/vscode/package.json
 is "$(jq -r .version "$extension")" "$("$BIN/plcctl" --version)" || fail "the extension has another version than plcctl"
