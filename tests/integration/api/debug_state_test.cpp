@@ -1,5 +1,7 @@
 // The state of a debugger comes over DDS in one page.
+#include <memory>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -57,6 +59,18 @@ TEST_F(StateOfADebugger, TellsTheInstanceWhoHasAsked) {
   EXPECT_EQ(page_.asked().session, 0U);
   ASSERT_TRUE(read("line1", {.session = 7}));
   EXPECT_EQ(page_.asked().session, 7U);
+}
+
+TEST_F(StateOfADebugger, IsRefusedIfItIsNone) {
+  host_.answer_with({.text = R"({"session":1})"});
+  page_.write(R"({"session":1,"tasks":[]})");
+  const std::vector<std::string> look{"debug", "line1", "tasks"};
+  const auto good = run_plcctl(domain_.number(), look);
+  EXPECT_EQ(good.code, 0) << good.errors;
+  page_.write(R"({"session":1,"tasks":)" + std::string(60'000, '['));
+  const auto bad = run_plcctl(domain_.number(), look);
+  EXPECT_NE(bad.code, 0) << bad.output;
+  EXPECT_THAT(bad.errors, HasSubstr("the host's answer is not understood"));
 }
 
 TEST_F(StateOfADebugger, IsNoneWithoutADebugBuild) {
