@@ -92,7 +92,7 @@ std::string file_place(std::string_view file, std::int64_t line) {
 }
 
 // An order has a greatest length, and the last parts of a path tell most.
-std::string shortened(std::string_view path, std::size_t most) {
+std::string without_first_folders(std::string_view path, std::size_t most) {
   while (path.size() > most) {
     const std::size_t next = path.find('/', 1);
     if (next == std::string_view::npos) break;
@@ -221,7 +221,7 @@ Json DapSession::set_one(const std::string& key, const Result<std::string>& plac
   const std::int64_t line = number_in(wanted, "line");
   const bool in_file = key != kFunctions;
   const std::size_t room = kMaxArgument - std::min(kMaxArgument, kOrderFrame + parts->size());
-  const std::string whole = in_file ? file_place(shortened(*place, room), line) : *place;
+  const std::string whole = in_file ? file_place(without_first_folders(*place, room), line) : *place;
   const auto answer = link_.command(fmt::format("break {}{}", whole, *parts));
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
