@@ -1,5 +1,6 @@
 // The answers to a client of the Debug Adapter Protocol.
 #include "api/cli/debug/dap_session.hpp"
+#include "shm/base/names.hpp"
 
 #include <string>
 #include <vector>
@@ -196,7 +197,7 @@ TEST_F(DapSources, AreThoseInWhichTheInstanceSetsTheirBreakpoints) {
 }
 
 TEST_F(DapSources, WithLongPathsAreAskedForByTheLastParts) {
-  const std::string folder(200, 'f');
+  const std::string folder(kMaxArgument - 300, 'f');
   set("/" + folder + "/b/same.st",
       {{"line", 2}, {"logMessage", std::string(200, 'x')}, {"condition", std::string(200, 'y')}});
   EXPECT_THAT(instance_.commands.back(), testing::StartsWith("break /b/same.st:2 if y"));
