@@ -79,13 +79,6 @@ void choose_like(Chosen& chosen, const SymbolTable& table, const std::string& pa
   }
 }
 
-// Of one value as text, with what stands around it in an array.
-std::size_t most_text(const VariableSymbol& symbol) {
-  constexpr std::size_t kAround = 4;
-  if (is_string(symbol.type)) return symbol.bytes * 3 + kAround;  // each byte may be $hh
-  return symbol.bytes <= 4 ? symbol.bytes * 5 + kAround : 40;
-}
-
 // Adds up what a page holds.
 class Page {
  public:
@@ -97,7 +90,8 @@ class Page {
     row.first = selection_.elements.size();
     row.count = row.element ? 1 : std::min<std::size_t>(symbol.elements(), kShownElements);
     const std::size_t values = row.count * symbol.bytes;
-    const std::size_t text = std::min(kMostValueText, row.count * most_text(symbol));
+    // A byte of a string has up to three characters.
+    const std::size_t text = std::min(kMostValueText, std::max<std::size_t>(values * 3, 40));
     // A whole array has no one value that it is forced to.
     const std::size_t texts = row.element || symbol.dimensions.empty() ? 2 : 1;
     const std::size_t bytes =

@@ -1,6 +1,5 @@
 // The answers to a client of the Debug Adapter Protocol.
 #include "api/cli/debug/dap_session.hpp"
-#include "shm/base/names.hpp"
 
 #include <string>
 #include <vector>
@@ -9,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "shm/base/names.hpp"
 #include "tests/unit/api/debugged_instance.hpp"
 
 namespace plchost {

@@ -209,33 +209,20 @@ std::size_t bytes_of(const std::vector<plc_VariableRecord>& records) {
   return bytes;
 }
 
-// Of each type, values and arrays with much text.
-TEST(VariableRecords, FitIntoASampleWhateverTheirTypeIs) {
+// Of texts in which each byte is written as $01, also of that which it is forced to.
+TEST(VariableRecords, FitIntoASampleWithTheLongestTexts) {
   constexpr std::size_t kMostSample = std::size_t{256} * 1024;
-  for (const VariableTypeTraits& type : variable_types()) {
-    for (const std::uint32_t elements : {1U, 7U, 64U}) {
-      for (const unsigned byte : {0x00U, 0x01U, 0x80U, 0x88U, 0xffU}) {
-        std::vector<VariableSymbol> symbols;
-        const std::string end = elements > 1 ? "[]" : "";
-        for (int i = 0; i < 1100; ++i) {
-          symbols.push_back({.name = fmt::format("v{:04}{}", i, end),
-                             .type = type.type,
-                             .read_only = false,
-                             .bytes = type.bytes != 0 ? type.bytes : 20,
-                             .dimensions = {},
-                             .task = "",
-                             .area = ""});
-          if (elements > 1) symbols.back().dimensions = {{0, elements}};
-        }
-        const SymbolTable table = table_of(symbols);
-        const auto page = select_variables(table, {});
-        ASSERT_TRUE(page);
-        ValueReply reply{.elements = page->elements, .forced = {}, .values = {}};
-        reply.values.assign(page->elements.size() * symbols.front().bytes, static_cast<std::byte>(byte));
-        EXPECT_LT(bytes_of(records_of(table, *page, reply, elements > 1 ? ValueReply{} : reply)), kMostSample)
-            << type.name << " of " << elements << " elements of bytes " << byte;
-      }
-    }
+  for (const std::uint32_t size : {20U, 96U, 255U, 1000U, kMaxVariableBytes}) {
+    std::vector<VariableSymbol> symbols;
+    for (int i = 0; i < 1100; ++i)
+      symbols.push_back(
+          text_of_bytes(fmt::format("{:04}{}", i, std::string(kMaxVariableName - 4, 'n')), size));
+    const SymbolTable table = table_of(symbols);
+    const auto page = select_variables(table, {});
+    ASSERT_TRUE(page);
+    ValueReply reply{.elements = page->elements, .forced = {}, .values = {}};
+    reply.values.assign(page->elements.size() * size, std::byte{1});
+    EXPECT_LT(bytes_of(records_of(table, *page, reply, reply)), kMostSample) << size;
   }
 }
 
