@@ -38,7 +38,7 @@ PROGRAM Doubler
   flag := go;
 END_PROGRAM
 PROGRAM Counter
-  VAR END_VAR
+  VAR edges AT %QB4 : USINT; END_VAR
   edges := edges + 1;
 END_PROGRAM
 PROGRAM Loop
@@ -294,7 +294,8 @@ TEST_P(TranslatedText, ThatIsChangedOnlineGoesOnWithItsValues) {
   ASSERT_TRUE(build(text, "other").success());
   const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
   EXPECT_EQ(refused.code, ErrorCode::refused);
-  EXPECT_THAT(refused.text, HasSubstr("variables 'ONE.FRESH': qwLayout is"));
+  EXPECT_THAT(refused.text,
+              HasSubstr("variable 'ONE.FRESH': its type is REAL, of the one that runs it is DINT"));
 }
 
 TEST_F(TranslatedByMatiec, ThatIsNamedAsAHeaderOfCIsBuilt) {
