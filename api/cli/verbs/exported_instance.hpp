@@ -7,6 +7,7 @@
 
 #include <control.h>
 
+#include "api/dds/variable_page.hpp"
 #include "instances/adapters/plcopen/write_project.hpp"
 
 namespace plchost {
