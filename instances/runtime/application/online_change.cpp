@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <iterator>
 #include <utility>
 
@@ -73,18 +74,15 @@ Result<void> OnlineChange::compare(const ApplicationDeclaration& declaration) co
   const auto type_in = [](const auto& variables, const auto& symbol_of) {
     return [&variables, symbol_of](std::string_view name) {
       const auto found = std::ranges::find_if(variables, [&](const auto& variable) {
-        return same_variable_name(symbol_of(variable).name, name);
+        return same_variable_name(std::invoke(symbol_of, variable).name, name);
       });
-      return found == std::ranges::end(variables) ? std::string() : type_text(symbol_of(*found));
+      return found == std::ranges::end(variables) ? std::string() : type_text(std::invoke(symbol_of, *found));
     };
   };
   const auto running = host_.variables().access().symbols();
   const auto next = declaration.seen.variables();
-  add(compare_variables(
-      host_.declaration().variables, declaration.variables,
-      type_in(running, [](const VariableSymbol& symbol) -> const VariableSymbol& { return symbol; }),
-      type_in(next,
-              [](const DeclaredVariable& variable) -> const VariableSymbol& { return variable.symbol; })));
+  add(compare_variables(host_.declaration().variables, declaration.variables,
+                        type_in(running, std::identity()), type_in(next, &DeclaredVariable::symbol)));
   if (lines.empty()) return {};
   return failure(ErrorCode::refused,
                  fmt::format("{} cannot take over online: {}; nothing is changed; load it without --online",
