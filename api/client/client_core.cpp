@@ -65,12 +65,9 @@ void ClientCore::update() {
 }
 
 void ClientCore::take_answers(Answers which) {
-  const auto wants = [which](const auto& from, const auto& inbox) {
-    return from && (which == Answers::all || inbox.expects_any());
-  };
-  if (wants(replies_, replied_)) take_replies();
-  if (wants(runs_, run_)) take_runs();
-  if (wants(download_acks_, downloaded_)) take_download_acks();
+  if (wants(which, replies_, replied_)) take_replies();
+  if (wants(which, runs_, run_)) take_runs();
+  if (wants(which, download_acks_, downloaded_)) take_download_acks();
   take_pages(which);
 }
 

@@ -119,6 +119,9 @@ class ClientCore {
   void update_hosts();
   enum class Answers : std::uint8_t { expected, all };
   void take_answers(Answers which);
+  [[nodiscard]] static bool wants(Answers which, const dds::TopicReader& from, const auto& inbox) {
+    return from && (which == Answers::all || inbox.expects_any());
+  }
   void take_replies();
   template <class Page>
   struct Pages {

@@ -17,11 +17,20 @@ namespace {
 constexpr Duration kPagePatience = std::chrono::milliseconds(500);
 constexpr Duration kBusyPause = std::chrono::milliseconds(50);
 
+ApiRequest to_instance(std::string host, std::string instance, std::int32_t operation,
+                       const plc_ListPart& part) {
+  return {.host = std::move(host),
+          .operation = operation,
+          .instance = std::move(instance),
+          .argument = "",
+          .part = part};
+}
+
 }  // namespace
 
 void ClientCore::take_pages(Answers which) {
   const auto take = [&]<class Page>(Pages<Page>& pages) {
-    if (!pages.from || (which != Answers::all && !pages.come.expects_any())) return;
+    if (!wants(which, pages.from, pages.come)) return;
     dds::take_valid_told<Page, dds::kTopicOf<Page>.qos.depth>(
         pages.from.reader.get(), answering_, [&](const Page& page, const auto& /*info*/) {
           pages.come.put({page.related_identity, dds::text_of(page.host)}, [&] { return listing_of(page); });
@@ -82,33 +91,21 @@ Async<Result<NodesTold>> ClientCore::list_routes(std::string host, NodeQuery que
 
 Async<Result<LogListing>> ClientCore::read_log(std::string host, std::string instance, LogQuery query,
                                                TimePoint deadline) {
-  ApiRequest request{.host = std::move(host),
-                     .operation = plc_OPERATION_READ_LOG,
-                     .instance = std::move(instance),
-                     .argument = "",
-                     .part = part_of(query)};
-  return ask_for_page<plc_LogPage>(std::move(request), deadline);
+  return ask_for_page<plc_LogPage>(
+      to_instance(std::move(host), std::move(instance), plc_OPERATION_READ_LOG, part_of(query)), deadline);
 }
 
 Async<Result<VariableListing>> ClientCore::list_variables(std::string host, std::string instance,
                                                           VariableQuery query, TimePoint deadline) {
   PLCHOST_CO_TRY_ASSIGN(const auto part, part_of(query));
-  ApiRequest request{.host = std::move(host),
-                     .operation = plc_OPERATION_LIST_VARIABLES,
-                     .instance = std::move(instance),
-                     .argument = "",
-                     .part = part};
-  co_return co_await ask_for_page<plc_VariablePage>(std::move(request), deadline);
+  co_return co_await ask_for_page<plc_VariablePage>(
+      to_instance(std::move(host), std::move(instance), plc_OPERATION_LIST_VARIABLES, part), deadline);
 }
 
 Async<Result<DebugPart>> ClientCore::read_debug(std::string host, std::string instance, DebugQuery query,
                                                 TimePoint deadline) {
-  ApiRequest request{.host = std::move(host),
-                     .operation = plc_OPERATION_READ_DEBUG,
-                     .instance = std::move(instance),
-                     .argument = "",
-                     .part = part_of(query)};
-  return ask_for_page<plc_DebugPage>(std::move(request), deadline);
+  return ask_for_page<plc_DebugPage>(
+      to_instance(std::move(host), std::move(instance), plc_OPERATION_READ_DEBUG, part_of(query)), deadline);
 }
 
 }  // namespace plchost

@@ -41,6 +41,14 @@ bool BuildContext::open_folder() {
   return true;
 }
 
+bool BuildContext::rewrite(std::span<const std::string> files,
+                           const std::function<std::string(const std::string&)>& change) {
+  return std::ranges::all_of(files, [&](const std::string& file) {
+    const auto text = folder().read(file);
+    return has(text) && has(folder().replace(file, change(*text)));
+  });
+}
+
 std::optional<ProgramEnd> BuildContext::run(const char* what, const std::vector<std::string>& command,
                                             Duration limit) {
   auto end = run_program(command, folder().path(), {.time = limit, .cancelled = order.cancelled});

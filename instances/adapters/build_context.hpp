@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,6 +43,9 @@ class BuildContext {
   /// Makes the folder for the files between. Once.
   bool open_folder();
   [[nodiscard]] const WorkFolder& folder() const { return *folder_; }
+  /// Each file of that folder becomes what `change` makes of it.
+  bool rewrite(std::span<const std::string> files,
+               const std::function<std::string(const std::string&)>& change);
   /// Runs a program in that folder. Nothing: it has not run to its end.
   std::optional<ProgramEnd> run(const char* what, const std::vector<std::string>& command, Duration limit);
   /// Runs a compiler for C or C++. `words`: its command. Errors in a source are told there.

@@ -148,14 +148,11 @@ class MatiecTranslator : public Translator {
 
   // In the initial values of globals.
   bool end_escapes() {
-    std::vector<std::string> files{configuration().name};
+    std::vector<std::string> files{configuration().name + ".c"};
     for (const iec::Resource& resource : configuration().resources)
-      files.push_back(resource.name.empty() ? "RESOURCE" : resource.name);
-    return std::ranges::all_of(files, [&](const std::string& name) {
-      const auto code = context_.folder().read(name + ".c");
-      return context_.has(code) &&
-             context_.has(context_.folder().replace(name + ".c", iec::with_ended_escapes(*code, kTextMacro)));
-    });
+      files.push_back((resource.name.empty() ? "RESOURCE" : resource.name) + ".c");
+    return context_.rewrite(
+        files, [](const std::string& code) { return iec::with_ended_escapes(code, kTextMacro); });
   }
 
   // Of the program, as iec2c should have written it.

@@ -119,11 +119,7 @@ class StrucppTranslator : public Translator {
   bool end_escapes() {
     std::vector<std::string> files = files_;
     files.emplace_back("generated.hpp");
-    return std::ranges::all_of(files, [&](const std::string& file) {
-      const auto code = context_.folder().read(file);
-      return context_.has(code) &&
-             context_.has(context_.folder().replace(file, iec::with_ended_escapes(*code)));
-    });
+    return context_.rewrite(files, [](const std::string& code) { return iec::with_ended_escapes(code); });
   }
 
   bool instrument() {

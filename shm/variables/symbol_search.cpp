@@ -237,11 +237,9 @@ std::unexpected<Error> SymbolTable::not_found(std::string_view name, std::string
         fmt::format("'{}': it is {}; name {}", shown(name), type_text(symbol),
                     symbol.dimensions.empty() ? symbol.name : "an element, as " + element_name(symbol, 0)));
   }
-  const auto member = std::ranges::find_if(symbols_, [&](const VariableSymbol& symbol) {
-    return symbol.name.size() > canonical.size() + 1 && symbol.name[canonical.size()] == '.' &&
-           same_variable_name(cut(symbol.name, canonical.size()), canonical);
-  });
-  if (member != symbols_.end()) {
+  const std::string prefix = std::string(canonical) + ".";
+  const auto member = find_place(prefix);
+  if (member != symbols_.end() && same_variable_name(member->name.substr(0, prefix.size()), prefix)) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("'{}' has members; name one, as {}, or all, as {}.*", shown(name),
                                member->name, shown(name)));

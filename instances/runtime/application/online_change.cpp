@@ -73,9 +73,9 @@ Result<void> OnlineChange::compare(const ApplicationDeclaration& declaration) co
   add(compare_areas(host_.areas().declared(), declaration.areas));
   const auto type_in = [](const auto& variables, const auto& symbol_of) {
     return [&variables, symbol_of](std::string_view name) {
-      const auto found = std::ranges::find_if(variables, [&](const auto& variable) {
-        return same_variable_name(std::invoke(symbol_of, variable).name, name);
-      });
+      const auto found = std::ranges::find_if(
+          variables, [&](const VariableSymbol& symbol) { return same_variable_name(symbol.name, name); },
+          symbol_of);
       return found == std::ranges::end(variables) ? std::string() : type_text(std::invoke(symbol_of, *found));
     };
   };

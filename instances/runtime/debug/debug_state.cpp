@@ -40,7 +40,7 @@ Json locals_of(const Plc_Frame& frame, const DeclaredPou& pou) {
   return locals;
 }
 
-// In steps: a state that changes all the time cannot be read in parts.
+// In steps: else the state would be another one at each look, and be written and read anew.
 Duration time_of(const DebugTask::Halt& halt) {
   constexpr auto kStep = std::chrono::milliseconds(100);
   return (MonotonicClock::now() - halt.since) / kStep * kStep;

@@ -142,6 +142,8 @@ class Instance {
   void let_tasks_go_on(std::string_view why);
   void show_halts() noexcept;
   void resume_debugging();
+  /// Tasks can halt from here on.
+  void begin_debugging();
   /// "2 halted tasks were let go first", or nothing. Once.
   [[nodiscard]] std::string take_let_go();
   [[nodiscard]] std::string with_let_go(const std::string& text);

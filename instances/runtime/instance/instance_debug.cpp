@@ -91,7 +91,11 @@ void Instance::let_tasks_go_on(std::string_view why) {
 }
 
 void Instance::resume_debugging() {
-  if (!has_debugger() || life_.state() != ApplicationState::running) return;
+  if (life_.state() == ApplicationState::running) begin_debugging();
+}
+
+void Instance::begin_debugging() {
+  if (!has_debugger()) return;
   host_->debug().resume(scheduler_);
   show_debug_state();  // before the reply
 }

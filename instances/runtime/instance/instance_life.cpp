@@ -45,8 +45,7 @@ Result<TaskSet::Prepared> Instance::prepare_start() {
 
 void Instance::start(TaskSet::Prepared prepared, std::string_view why) {
   host_->areas().outputs().arm();
-  if (has_debugger()) host_->debug().resume(scheduler_);  // the first cycle can halt
-  show_debug_state();
+  begin_debugging();  // the first cycle can halt
   tasks_->start(std::move(prepared));
   host_->events().publish_bound(true);
   unbound_.assign(application_->tasks().size(), false);
@@ -75,8 +74,7 @@ void Instance::begin_stop(std::string_view why) {
 }
 
 Result<std::string> Instance::begin_single_cycle() {
-  if (has_debugger()) host_->debug().resume(scheduler_);
-  show_debug_state();
+  begin_debugging();
   host_->areas().outputs().arm();
   if (auto begun = tasks_->begin_single_cycle(start_.settings.scheduler); !begun) {
     host_->areas().outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
