@@ -19,7 +19,7 @@ function(plchost_headers name)
     target_compile_options(${name} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
   endif()
   target_precompile_headers(${name} PRIVATE <algorithm> <array> <atomic> <chrono> <expected> <filesystem> <functional>
-    <map> <memory> <optional> <string> <string_view> <thread> <utility> <vector> <fmt/format.h> ${ARGN})
+    <map> <memory> <optional> <ranges> <span> <string> <string_view> <thread> <utility> <vector> <fmt/format.h> <nlohmann/json.hpp> <spdlog/spdlog.h> ${ARGN})
 endfunction()
 
 function(plchost_options name)

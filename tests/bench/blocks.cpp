@@ -31,15 +31,15 @@ namespace plchost::bench {
 namespace {
 
 constexpr Duration kBlocksSlice = std::chrono::milliseconds(500);
-constexpr std::size_t kMostSamples = 1'000'000;  // of a row, or half as many more
+constexpr std::size_t kMostBlockSamples = 1'000'000;  // of a row, or half as many more
 constexpr std::size_t kLargest = kMaxBlockSize;
-constexpr std::array<std::size_t, 3> kSizes = {64, 512, kLargest};
+constexpr std::array<std::size_t, 3> kBlockSizes = {64, 512, kLargest};
 
 enum class Way : std::uint32_t { ours, iceoryx, socket, bare, memcpy };
 enum class Mode : std::uint32_t { echo, sink };
 
 /// Shared by the two processes: the order for the peer.
-struct Board {
+struct WaysBoard {
   std::atomic<std::uint32_t> ordered{0};  // orders given so far
   std::atomic<std::uint32_t> begun{0};
   std::atomic<std::uint32_t> ended{0};
@@ -60,7 +60,7 @@ struct Pipes {
   std::unique_ptr<BlocksPipe> socket;
   std::unique_ptr<BlocksPipe> bare;
 
-  static Result<Pipes> open(const std::string& pool, Board& board, BlocksSide side, int socket,
+  static Result<Pipes> open(const std::string& pool, WaysBoard& board, BlocksSide side, int socket,
                             bool with_iceoryx) {
     Pipes pipes;
     PLCHOST_TRY_ASSIGN(pipes.ours, make_our_pipe(pool, side));
@@ -77,7 +77,7 @@ struct Pipes {
 };
 
 /// The peer's side of one slice.
-void answer(BlocksPipe& pipe, Board& board) {
+void answer(BlocksPipe& pipe, WaysBoard& board) {
   std::vector<std::byte> buffer(kLargest);
   const bool echo = board.mode.load() == Mode::echo;
   board.begun.store(board.ordered.load());
@@ -92,7 +92,7 @@ void answer(BlocksPipe& pipe, Board& board) {
   }
 }
 
-int run_peer(const Plan& plan, Board& board, const std::string& pool, int socket, bool with_iceoryx) {
+int run_peer(const Plan& plan, WaysBoard& board, const std::string& pool, int socket, bool with_iceoryx) {
   if (!bind_thread({plan.poster_core})) return 1;
   const auto pipes = Pipes::open(pool, board, BlocksSide::peer, socket, with_iceoryx);
   if (!pipes) return 1;
@@ -114,11 +114,11 @@ int run_peer(const Plan& plan, Board& board, const std::string& pool, int socket
 /// Both sides of all ways, and the measurement with them.
 class Pair {
  public:
-  Pair(const Plan& plan, Board& board, const Pipes& pipes) : plan_(plan), board_(board), pipes_(pipes) {}
+  Pair(const Plan& plan, WaysBoard& board, const Pipes& pipes) : plan_(plan), board_(board), pipes_(pipes) {}
 
   /// Half the time there and back.
   Result<void> latency(Way way, std::size_t size, Duration slice, Samples& into) {
-    Samples samples(kMostSamples / 2);
+    Samples samples(kMostBlockSamples / 2);
     auto done = with_peer(way, Mode::echo, [&](BlocksPipe& pipe) {
       std::vector<std::byte> out(size, std::byte{1});
       std::vector<std::byte> in(kLargest);
@@ -133,7 +133,7 @@ class Pair {
         now = after;
       }
     });
-    if (into.size() < kMostSamples) into.append(samples);
+    if (into.size() < kMostBlockSamples) into.append(samples);
     return done;
   }
 
@@ -195,7 +195,7 @@ class Pair {
   }
 
   const Plan& plan_;
-  Board& board_;
+  WaysBoard& board_;
   const Pipes& pipes_;
 };
 
@@ -264,7 +264,7 @@ Result<Row> measure_throughput(const Plan& plan, Pair& pair, std::size_t size, b
   return row;
 }
 
-Result<std::vector<Row>> measure_all(const Plan& plan, Board& board, const std::string& pool, int socket,
+Result<std::vector<Row>> measure_all(const Plan& plan, WaysBoard& board, const std::string& pool, int socket,
                                      bool with_iceoryx) {
   const auto pipes = [&] {
     const OnCore routers_inherit_it(plan.task_core);
@@ -275,7 +275,7 @@ Result<std::vector<Row>> measure_all(const Plan& plan, Board& board, const std::
   Pair pair(plan, board, *pipes);
   std::vector<Row> rows;
   for (const auto measure : {&measure_latency, &measure_throughput}) {
-    for (const std::size_t size : kSizes) {
+    for (const std::size_t size : kBlockSizes) {
       PLCHOST_TRY_ASSIGN(auto row, measure(plan, pair, size, with_iceoryx));
       rows.push_back(std::move(row));
     }
@@ -285,9 +285,10 @@ Result<std::vector<Row>> measure_all(const Plan& plan, Board& board, const std::
 }
 
 Result<std::vector<Row>> measure_pair(const Plan& plan, const std::string& pool) {
-  void* memory = ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* memory =
+      ::mmap(nullptr, sizeof(WaysBoard), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "mmap", errno);
-  auto* const board = new (memory) Board;
+  auto* const board = new (memory) WaysBoard;
   std::array<int, 2> ends{};
   if (::socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
     return failure(ErrorCode::system, "socketpair", errno);
@@ -311,7 +312,7 @@ Result<std::vector<Row>> measure_pair(const Plan& plan, const std::string& pool)
   int status = 0;
   ::waitpid(peer, &status, 0);
   NodeDirectory::remove(pool);
-  ::munmap(memory, sizeof(Board));
+  ::munmap(memory, sizeof(WaysBoard));
   return rows;
 }
 

@@ -22,9 +22,9 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr std::size_t kTasks = 100;
+constexpr std::size_t kBurstTasks = 100;
 constexpr Duration kInterval = std::chrono::milliseconds(10);
-constexpr Duration kWork = std::chrono::microseconds(5);
+constexpr Duration kBurstWork = std::chrono::microseconds(5);
 constexpr ThreadPriority kAbove{.fifo = kPriority.fifo + 1};
 
 struct Execution {
@@ -37,7 +37,7 @@ struct Execution {
 using Log = std::vector<std::vector<Execution>>;
 
 Log make_log(Duration slice) {
-  Log log(kTasks);
+  Log log(kBurstTasks);
   for (auto& line : log) line.reserve(static_cast<std::size_t>((slice + 2 * kWarmUp) / kInterval) * 2);
   return log;
 }
@@ -58,23 +58,23 @@ void add_overheads(const Log& log, TimePoint begin, TimePoint end, Samples& into
     while (next < all.size() && all[next].release == all[i].release) ++next;
     for (std::size_t k = i; k + 1 < next; ++k) before += all[k].end - all[k].start;
     const TimePoint release = all[i].release;
-    if (next - i == kTasks && release >= begin && release < end)
-      into.push((all[next - 1].start - release - before) / static_cast<Duration::rep>(kTasks));
+    if (next - i == kBurstTasks && release >= begin && release < end)
+      into.push((all[next - 1].start - release - before) / static_cast<Duration::rep>(kBurstTasks));
     i = next;
   }
 }
 
 Result<void> run_ours(const Plan& plan, Duration slice, Samples& into) {
   Log log = make_log(slice);
-  std::vector<Execution> current(kTasks);
+  std::vector<Execution> current(kBurstTasks);
   std::vector<TaskConfig> configs;
-  for (std::size_t i = 0; i < kTasks; ++i) {
+  for (std::size_t i = 0; i < kBurstTasks; ++i) {
     TaskConfig task;
     task.name = fmt::format("task{}", i);
     task.interval = kInterval;
     task.entry = [&one = current[i]] {
       one.start = MonotonicClock::now();
-      work(kWork);
+      work(kBurstWork);
       one.end = MonotonicClock::now();
     };
     task.after_cycle = [&one = current[i], &line = log[i]](const TaskCounters& counters) {
@@ -107,7 +107,7 @@ struct BareBurst {
   bool one_word = false;
   std::atomic<bool> stopping{false};
   TimePoint release{};
-  std::array<std::atomic<std::uint32_t>, kTasks> words{};
+  std::array<std::atomic<std::uint32_t>, kBurstTasks> words{};
 
   void run_task(std::size_t index, std::vector<Execution>& line) noexcept {
     auto& word = words[one_word ? 0 : index];
@@ -118,12 +118,12 @@ struct BareBurst {
       seen = now;  // from here on no release is slept through
       if (stopping.load()) return;
       const TimePoint start = MonotonicClock::now();
-      work(kWork);
+      work(kBurstWork);
       add(line, {release, start, MonotonicClock::now()});
     }
   }
   void open_all() noexcept {
-    for (auto& word : std::span(words).first(one_word ? 1 : kTasks)) {
+    for (auto& word : std::span(words).first(one_word ? 1 : kBurstTasks)) {
       word.fetch_add(1, std::memory_order_release);
       wake_private(word);
     }
@@ -150,10 +150,10 @@ struct BareBurst {
 
 Result<void> start_bare(const Plan& plan, BareBurst& bare, Log& log, std::vector<Thread>& threads) {
   const OnCore threads_inherit_it(plan.task_core);
-  for (std::size_t i = 0; i <= kTasks; ++i) {
-    auto thread = i < kTasks ? Thread::start(
-                                   "bare", kPriority, [&, i] { bare.run_task(i, log[i]); })
-                             : Thread::start("bare-tick", kAbove, [&] { bare.run_tick(); });
+  for (std::size_t i = 0; i <= kBurstTasks; ++i) {
+    auto thread = i < kBurstTasks ? Thread::start(
+                                        "bare", kPriority, [&, i] { bare.run_task(i, log[i]); })
+                                  : Thread::start("bare-tick", kAbove, [&] { bare.run_tick(); });
     if (!thread) return std::unexpected(std::move(thread.error()));
     threads.push_back(std::move(*thread));
   }

@@ -14,10 +14,9 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kPeriod = std::chrono::milliseconds(1);
-constexpr auto kPatience = std::chrono::seconds(10);
+constexpr auto kCorunPatience = std::chrono::seconds(10);
 
-struct Figures {
+struct CorunFigures {
   Samples ours;
   Samples floor;
   std::uint64_t lost_ours = 0;
@@ -27,24 +26,24 @@ struct Figures {
 
 /// Where the scheduler's grid lies is known from its first release.
 Result<TimePoint> release_of(const ScheduledLoop& loop) {
-  const TimePoint end = MonotonicClock::now() + kPatience;
+  const TimePoint end = MonotonicClock::now() + kCorunPatience;
   while (loop.last_release() == TimePoint{}) {
     if (MonotonicClock::now() > end) return failure(ErrorCode::timed_out, "no cycle ran");
-    std::this_thread::sleep_for(kPeriod);
+    std::this_thread::sleep_for(kCyclePeriod);
   }
   return loop.last_release();
 }
 
-Result<void> run_slice(const Plan& plan, ScheduledLoop& loop, Duration slice, Figures& into) {
-  const auto capacity = static_cast<std::size_t>((slice + 2 * kWarmUp) / kPeriod) * 2;
+Result<void> run_slice(const Plan& plan, ScheduledLoop& loop, Duration slice, CorunFigures& into) {
+  const auto capacity = static_cast<std::size_t>((slice + 2 * kWarmUp) / kCyclePeriod) * 2;
   CycleLog our_log(capacity);
   CycleLog bare_log(capacity);
-  BareLoop bare(Wait::sleep, kPeriod);
+  BareLoop bare(Wait::sleep, kCyclePeriod);
   {
     const OnCore threads_inherit_it(plan.task_core);
     if (auto started = loop.start(our_log); !started) return started;
     PLCHOST_TRY_ASSIGN(const auto release, release_of(loop));
-    bare.align(release + kPeriod / 2);
+    bare.align(release + kCyclePeriod / 2);
     if (auto started = bare.start(bare_log); !started) return started;
   }
   const OnCore out_of_the_way(plan.poster_core);
@@ -58,9 +57,9 @@ Result<void> run_slice(const Plan& plan, ScheduledLoop& loop, Duration slice, Fi
   const auto floor = bare_log.between(begin, end);
   add_latencies(ours, into.ours);
   add_latencies(floor, into.floor);
-  into.lost_ours += lost_cycles(ours, kPeriod);
-  into.lost_floor += lost_cycles(floor, kPeriod);
-  into.stalls += find_stalls(ours, floor, kPeriod);
+  into.lost_ours += lost_cycles(ours, kCyclePeriod);
+  into.lost_floor += lost_cycles(floor, kCyclePeriod);
+  into.stalls += find_stalls(ours, floor, kCyclePeriod);
   return stopped;
 }
 
@@ -73,7 +72,7 @@ double with_deviation(double count) {
   return count + 2 * std::sqrt(count);
 }
 
-Row to_row(std::string_view scheduler, const Figures& figures) {
+Row to_row(std::string_view scheduler, const CorunFigures& figures) {
   const Stalls& stalls = figures.stalls;
   const double p999 = decisive_p999(figures.ours);
   const double bare_p999 = decisive_p999(figures.floor);
@@ -101,10 +100,10 @@ Row to_row(std::string_view scheduler, const Figures& figures) {
 
 Result<std::vector<Row>> measure_corun(const Plan& plan) {
   std::vector<std::unique_ptr<ScheduledLoop>> loops;
-  std::vector<Figures> figures(all_schedulers().size());
+  std::vector<CorunFigures> figures(all_schedulers().size());
   std::vector<Subject> subjects;
   for (const auto& entry : all_schedulers()) {
-    loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kPeriod));
+    loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kCyclePeriod));
     subjects.push_back([&plan, &loop = *loops.back(), &into = figures[loops.size() - 1]](Duration slice) {
       return run_slice(plan, loop, slice, into);
     });

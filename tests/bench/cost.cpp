@@ -12,7 +12,7 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kSlice = std::chrono::seconds(1);
+constexpr Duration kCostSlice = std::chrono::seconds(1);
 
 /// Page faults so far in this process.
 double page_faults() {
@@ -27,7 +27,7 @@ Result<Row> measure_with_wait(const Plan& plan, Duration period, const char* nam
   CyclicFigures ours;
   CyclicFigures floor;
   auto done = alternate(
-      plan, {slices_of(plan, bare, period, floor), slices_of(plan, scheduled, period, ours)}, kSlice);
+      plan, {slices_of(plan, bare, period, floor), slices_of(plan, scheduled, period, ours)}, kCostSlice);
   if (!done) return std::unexpected(std::move(done.error()));
   const double more = summarise(ours.cpu_per_cycle).p50 - summarise(floor.cpu_per_cycle).p50;
   const auto per_cycle = [](std::uint64_t count, const CyclicFigures& figures) {

@@ -12,8 +12,6 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kPeriod = std::chrono::milliseconds(1);
-
 std::vector<Target> targets_for(std::string_view scheduler, const CyclicFigures& ours,
                                 const CyclicFigures& floor) {
   const Summary our = summarise(ours.latencies);
@@ -46,19 +44,20 @@ void add_nearer_floor(const std::string& name, const CyclicFigures& figures, Row
 }  // namespace
 
 Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
-  BareLoop bare(Wait::sleep, kPeriod);
+  BareLoop bare(Wait::sleep, kCyclePeriod);
   CyclicFigures floor;
-  BareHop ticking(kPeriod);
+  BareHop ticking(kCyclePeriod);
   CyclicFigures hop;
-  BareLoop reading(Wait::timer, kPeriod);
+  BareLoop reading(Wait::timer, kCyclePeriod);
   CyclicFigures timer;
-  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor), slices_of(plan, ticking, kPeriod, hop),
-                                slices_of(plan, reading, kPeriod, timer)};
+  std::vector<Subject> subjects{slices_of(plan, bare, kCyclePeriod, floor),
+                                slices_of(plan, ticking, kCyclePeriod, hop),
+                                slices_of(plan, reading, kCyclePeriod, timer)};
   std::vector<std::unique_ptr<ScheduledLoop>> loops;
   std::vector<CyclicFigures> figures(all_schedulers().size());
   for (const auto& entry : all_schedulers()) {
-    loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kPeriod));
-    subjects.push_back(slices_of(plan, *loops.back(), kPeriod, figures[loops.size() - 1]));
+    loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kCyclePeriod));
+    subjects.push_back(slices_of(plan, *loops.back(), kCyclePeriod, figures[loops.size() - 1]));
   }
   PLCHOST_TRY(alternate(plan, subjects));
   std::vector<Row> rows;

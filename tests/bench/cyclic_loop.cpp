@@ -13,7 +13,7 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr auto kStopLimit = std::chrono::seconds(10);
+constexpr auto kLoopStopLimit = std::chrono::seconds(10);
 
 void sleep_until(TimePoint release) noexcept {
   const timespec until = to_timespec(release);
@@ -107,7 +107,7 @@ Result<void> ScheduledLoop::start(CycleLog& log) {
 }
 
 Result<void> ScheduledLoop::stop() {
-  auto stopped = tasks_->stop(kStopLimit);
+  auto stopped = tasks_->stop(kLoopStopLimit);
   tasks_.reset();
   return stopped;
 }

@@ -14,7 +14,6 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr int kMaxUs = 100000;
 
 /// Lines "000012 000345": so many cycles with that latency in us, rounded down. Those above kMaxUs are only
@@ -39,10 +38,10 @@ void add_histogram(const std::string& text, Samples& into) {
 
 Result<void> run_cyclictest(const Plan& plan, Duration slice, Samples& into) {
   // By the number of cycles: its duration goes by whole seconds.
-  const auto text =
-      output_of({"cyclictest", "-q", "-m", "-t", "1", "-p", std::to_string(kPriority.fifo), "-i",
-                 std::to_string(kPeriod / std::chrono::microseconds(1)), "-a", std::to_string(plan.task_core),
-                 "-l", std::to_string(slice / kPeriod), "-h", std::to_string(kMaxUs)});
+  const auto text = output_of({"cyclictest", "-q", "-m", "-t", "1", "-p", std::to_string(kPriority.fifo),
+                               "-i", std::to_string(kCyclePeriod / std::chrono::microseconds(1)), "-a",
+                               std::to_string(plan.task_core), "-l", std::to_string(slice / kCyclePeriod),
+                               "-h", std::to_string(kMaxUs)});
   if (!text) return std::unexpected(text.error());
   add_histogram(*text, into);
   return {};
@@ -56,9 +55,9 @@ Result<std::vector<Row>> measure_cyclictest(const Plan& plan) {
     row.note = "skipped: cyclictest (Debian: rt-tests) is not installed";
     return std::vector{row};
   }
-  BareLoop bare(Wait::sleep, kPeriod);
+  BareLoop bare(Wait::sleep, kCyclePeriod);
   CyclicFigures floor;
-  auto done = alternate(plan, {slices_of(plan, bare, kPeriod, floor),
+  auto done = alternate(plan, {slices_of(plan, bare, kCyclePeriod, floor),
                                [&](Duration slice) { return run_cyclictest(plan, slice, row.ours); }});
   if (!done) return std::unexpected(std::move(done.error()));
   row.floor = floor.latencies;

@@ -23,7 +23,6 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr Duration kSettling = std::chrono::seconds(2);  // the promise; steady state begins there
 constexpr Duration kSettled = std::chrono::microseconds(1);
 constexpr auto kStopLimit = std::chrono::seconds(10);
@@ -40,7 +39,7 @@ class Reference {
   }
   /// How far it is behind the nearest point of the reference grid, in nanoseconds.
   [[nodiscard]] double deviation(TimePoint when) const {
-    const auto period = static_cast<double>(kPeriod.count());
+    const auto period = static_cast<double>(kCyclePeriod.count());
     return at(when) - std::round(at(when) / period) * period;
   }
 
@@ -80,7 +79,7 @@ class Firmware {
   void run(plc_reference_clock& record, const Reference& reference) {
     std::mt19937_64 random(1);
     std::uniform_real_distribution<double> noise(-kNoiseNs, kNoiseNs);
-    for (TimePoint next = MonotonicClock::now(); !ending_.load(); next += kPeriod) {
+    for (TimePoint next = MonotonicClock::now(); !ending_.load(); next += kCyclePeriod) {
       const timespec until = to_timespec(next);
       ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
       const TimePoint local = MonotonicClock::now();
@@ -109,7 +108,7 @@ Result<void> run_cycles(const Plan& plan, Duration length, Run& run, std::option
   TimePoint began{};
   TaskConfig task;
   task.name = "measured";
-  task.interval = kPeriod;
+  task.interval = kCyclePeriod;
   task.entry = [&] { began = MonotonicClock::now(); };
   task.after_cycle = [&](const TaskCounters& counters) {
     run.log.add({TimePoint(Duration(counters.release_ns)), began});
@@ -126,7 +125,7 @@ Result<void> run_cycles(const Plan& plan, Duration length, Run& run, std::option
   if (!set.distributed_clock().use_source(&source)) return failure(ErrorCode::busy, "the clock is in use");
   const OnCore out_of_the_way(plan.poster_core);
   if (auto started = set.start("CmpScheduleOneShot", {}); !started) return started;
-  while (first_release.load() == 0) std::this_thread::sleep_for(kPeriod);
+  while (first_release.load() == 0) std::this_thread::sleep_for(kCyclePeriod);
   reference.emplace(TimePoint(Duration(first_release.load())));
   {
     const Firmware firmware(record, *reference);
@@ -154,10 +153,10 @@ double largest_correction_us(std::span<const Cycle> cycles) {
   Duration largest{};
   for (std::size_t i = 1; i < cycles.size(); ++i) {
     const Duration distance = cycles[i].release - cycles[i - 1].release;
-    const auto periods = (distance + kPeriod / 2) / kPeriod;
+    const auto periods = (distance + kCyclePeriod / 2) / kCyclePeriod;
     // A release that was lost in between may have been corrected only once: no more than one bound either
     // way.
-    largest = std::max(largest, Duration(std::abs((distance - periods * kPeriod).count())));
+    largest = std::max(largest, Duration(std::abs((distance - periods * kCyclePeriod).count())));
   }
   return to_us(largest);
 }
@@ -219,7 +218,7 @@ std::vector<Series> series_of(std::span<const Cycle> cycles, const Reference& re
 
 Result<std::vector<Row>> measure_distributed_clock(const Plan& plan) {
   const Duration length = plan.each + kSettling;
-  Run run{.log = CycleLog(static_cast<std::size_t>(length / kPeriod) * 2 + 10'000)};
+  Run run{.log = CycleLog(static_cast<std::size_t>(length / kCyclePeriod) * 2 + 10'000)};
   std::optional<Reference> reference;
   PLCHOST_TRY(run_cycles(plan, length, run, reference));
   const auto cycles = run.log.between(TimePoint::min(), TimePoint::max());

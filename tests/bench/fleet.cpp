@@ -25,8 +25,8 @@ namespace {
 constexpr int kSmallFleet = 8;         // measured beside the large one, for the scale
 constexpr int kCommandsOfStarts = 6;   // one look and one command of each kind for so many starts of the plan
 constexpr int kPatienceSeconds = 120;  // until all hosts are there
-constexpr Duration kLook = std::chrono::seconds(1);
-constexpr int kLooks = 60;
+constexpr Duration kRestLook = std::chrono::seconds(1);
+constexpr int kRestLooks = 60;
 
 /// The processes of a host, as the host shows them.
 struct HostProcesses {
@@ -123,8 +123,8 @@ class Fleet {
   Result<void> settle(const NetworkSpace& machine) {
     double last = 0;
     PLCHOST_TRY_ASSIGN(Traffic before, machine.traffic(kCable));
-    for (int look = 0; look < kLooks; ++look) {
-      std::this_thread::sleep_for(kLook);
+    for (int look = 0; look < kRestLooks; ++look) {
+      std::this_thread::sleep_for(kRestLook);
       PLCHOST_TRY_ASSIGN(const Traffic now, machine.traffic(kCable));
       const double datagrams = (now - before).received_datagrams;
       if (look > 0 && std::abs(datagrams - last) <= last / 10) return {};

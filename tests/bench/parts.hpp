@@ -1,14 +1,19 @@
 #pragma once
 
+#include <chrono>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "shm/base/time.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/plot.hpp"
 #include "tests/bench/row.hpp"
 
 namespace plchost::bench {
+
+inline constexpr Duration kCyclePeriod =
+    std::chrono::milliseconds(1);  ///< of a task and of its floor, if the part says no other
 
 /// One part of the benchmark: a file of its own with one function, and a line in the table of parts.cpp.
 struct Part {

@@ -14,9 +14,8 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr std::size_t kTasks = 500;
-constexpr Duration kPeriod = std::chrono::milliseconds(1);
-constexpr Duration kSlice = std::chrono::seconds(1);
+constexpr std::size_t kPolledTasks = 500;
+constexpr Duration kPollSlice = std::chrono::seconds(1);
 
 using Variables = std::vector<std::function<bool()>>;
 
@@ -38,23 +37,24 @@ Result<void> run_ours(const Plan& plan, const Variables& variables, Duration sli
 }  // namespace
 
 Result<std::vector<Row>> measure_poll(const Plan& plan) {
-  std::vector<std::atomic<bool>> values(kTasks);
+  std::vector<std::atomic<bool>> values(kPolledTasks);
   Variables variables;
   for (const auto& value : values) variables.emplace_back([&value] { return value.load(); });
   std::atomic<bool> any{false};
-  BareLoop reading(Wait::two_timers, kPeriod, [&] {
+  BareLoop reading(Wait::two_timers, kCyclePeriod, [&] {
     for (const auto& variable : variables) {
       if (variable()) any.store(true);
     }
   });
-  BareLoop empty(Wait::two_timers, kPeriod, [] {});
+  BareLoop empty(Wait::two_timers, kCyclePeriod, [] {});
   CyclicFigures floor;
   CyclicFigures nothing;
   Samples ours;
-  auto done = alternate(plan,
-                        {slices_of(plan, reading, kPeriod, floor), slices_of(plan, empty, kPeriod, nothing),
-                         [&](Duration slice) { return run_ours(plan, variables, slice, ours); }},
-                        kSlice);
+  auto done =
+      alternate(plan,
+                {slices_of(plan, reading, kCyclePeriod, floor), slices_of(plan, empty, kCyclePeriod, nothing),
+                 [&](Duration slice) { return run_ours(plan, variables, slice, ours); }},
+                kPollSlice);
   if (!done) return std::unexpected(std::move(done.error()));
   const double loop = summarise(nothing.cpu_per_cycle).p50;
   const double poll = summarise(ours).p50 - loop;
@@ -66,8 +66,8 @@ Result<std::vector<Row>> measure_poll(const Plan& plan) {
   row.extra = {{"empty_loop_us", loop},
                {"poll_us", poll},
                {"floor_poll_us", read},
-               {"poll_ns_per_task", 1e3 * poll / kTasks},
-               {"floor_poll_ns_per_task", 1e3 * read / kTasks}};
+               {"poll_ns_per_task", 1e3 * poll / kPolledTasks},
+               {"floor_poll_ns_per_task", 1e3 * read / kPolledTasks}};
   row.note =
       "CPU time per tick of 1 ms, a sample is a slice; poll_us is less that of a loop that polls nothing";
   return std::vector{row};

@@ -24,7 +24,7 @@ namespace plchost::bench {
 namespace {
 
 constexpr int kCalls = 1000;  // a sample is so many of them
-constexpr Duration kSlice = std::chrono::milliseconds(500);
+constexpr Duration kPoolSlice = std::chrono::milliseconds(500);
 constexpr std::uint32_t kMostMappings = 50'000;  // sem_open maps a page for each; a process may have 65,530
 constexpr std::size_t kMemory = 4096;
 
@@ -42,18 +42,18 @@ Subject calls(Samples& samples, Call call) {
   };
 }
 
-constexpr std::size_t kMostSamples = 1'000'000;
+constexpr std::size_t kMostPoolSamples = 1'000'000;
 
 template <class Ours, class Floor>
 Result<Row> measure_calls(const Plan& plan, const char* name, const char* note, std::vector<Target> targets,
                           Ours ours, Floor floor) {
   Row row{.name = name,
           .sample = "1,000 calls",
-          .ours = Samples(kMostSamples),
-          .floor = Samples(kMostSamples),
+          .ours = Samples(kMostPoolSamples),
+          .floor = Samples(kMostPoolSamples),
           .note = note};
   const OnCore here(plan.task_core);
-  PLCHOST_TRY(alternate(plan, {calls(row.floor, floor), calls(row.ours, ours)}, kSlice));
+  PLCHOST_TRY(alternate(plan, {calls(row.floor, floor), calls(row.ours, ours)}, kPoolSlice));
   row.targets = std::move(targets);
   for (Target& target : row.targets) {
     target.measured = ratio_of_times(summarise(row.ours).p50, summarise(row.floor).p50);

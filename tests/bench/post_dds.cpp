@@ -24,7 +24,7 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kSlice = std::chrono::seconds(1);
+constexpr Duration kPostDdsSlice = std::chrono::seconds(1);
 
 /// The floor: a thread that waits for samples.
 class BareReader {
@@ -114,7 +114,7 @@ Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Dd
         plan,
         {[&](Duration slice) { return run_slice(board, Order::post_bare, posts_in(slice), rows[0].floor); },
          [&](Duration slice) { return run_slice(board, Order::post_event, posts_in(slice), rows[0].ours); }},
-        kSlice);
+        kPostDdsSlice);
   }
   reader.stop();
   if (!done) return std::unexpected(done.error());

@@ -17,16 +17,16 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kSlice = std::chrono::seconds(1);
+constexpr Duration kPostManySlice = std::chrono::seconds(1);
 constexpr std::uint32_t kClients = 50;
 constexpr std::uint32_t kFloods = 3;
 constexpr std::uint32_t kPostsOfEach = 200;
-constexpr Duration kPatience = std::chrono::seconds(20);
+constexpr Duration kClientPatience = std::chrono::seconds(20);
 
 enum class Job : std::uint32_t { wait, connect, post, flood, end };
 
 /// The memory that the processes share.
-struct Board {
+struct ClientBoard {
   std::atomic<Job> job;
   std::atomic<std::uint32_t> connected;
   std::atomic<std::uint32_t> done;
@@ -34,7 +34,7 @@ struct Board {
 };
 
 /// One of the clients: does what the board says.
-void run_client(const DdsDomains& domains, Board& board, std::uint32_t index) {
+void run_client(const DdsDomains& domains, ClientBoard& board, std::uint32_t index) {
   while (board.job.load() == Job::wait) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   dds::DomainOptions options;
   options.domain = domains.plchost;
@@ -42,7 +42,7 @@ void run_client(const DdsDomains& domains, Board& board, std::uint32_t index) {
   if (!client) return;
   const auto post = [&] {
     const TimePoint start = MonotonicClock::now();
-    const auto report = (*client)->post_event(ping_event(), 1, Duration::zero(), kPatience);
+    const auto report = (*client)->post_event(ping_event(), 1, Duration::zero(), kClientPatience);
     return report && report->accepted == 1 ? (MonotonicClock::now() - start).count() : -1;
   };
   if (post() < 0) return;
@@ -64,7 +64,7 @@ void run_client(const DdsDomains& domains, Board& board, std::uint32_t index) {
 /// The measurements, once all ends are open.
 class Measurement {
  public:
-  Measurement(const Plan& plan, Board& board, ControlClient& client, PoolEvent event)
+  Measurement(const Plan& plan, ClientBoard& board, ControlClient& client, PoolEvent event)
       : plan_(plan), board_(board), client_(client), event_(event) {}
 
   Result<Row> many() {
@@ -90,7 +90,7 @@ class Measurement {
   Result<Row> flood() {
     Row row{.name = "post/beside floods", .sample = "a post and its acknowledgement"};
     row.note = "floor: the same without floods";
-    time_calls(kSlice, row.floor, [&] { post(); });
+    time_calls(kPostManySlice, row.floor, [&] { post(); });
     const std::uint64_t before = event_.counted().count();
     const TimePoint start = MonotonicClock::now();
     board_.job.store(Job::flood);
@@ -98,7 +98,7 @@ class Measurement {
     Samples commands;
     const ApiRequest listing{kBenchHost, plc_OPERATION_LIST_OBJECTS, "", ""};
     time_calls(plan_.each / 2, commands,
-               [&] { (void)client_.call(listing, MonotonicClock::now() + kPatience); });
+               [&] { (void)client_.call(listing, MonotonicClock::now() + kClientPatience); });
     board_.job.store(Job::connect);
     const auto took = std::chrono::duration<double>(MonotonicClock::now() - start).count();
     const Summary asked = summarise(commands);
@@ -110,21 +110,21 @@ class Measurement {
   }
 
  private:
-  void post() { (void)client_.post_event(ping_event(), 1, Duration::zero(), kPatience); }
+  void post() { (void)client_.post_event(ping_event(), 1, Duration::zero(), kClientPatience); }
 
   const Plan& plan_;
-  Board& board_;
+  ClientBoard& board_;
   ControlClient& client_;
   PoolEvent event_;
 };
 
-Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Board& board) {
+Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, ClientBoard& board) {
   Cell cell(plan, domains, own_name("bench"));
   PLCHOST_TRY(cell.start(plan));
   dds::DomainOptions options;
   options.domain = domains.plchost;
   PLCHOST_TRY_ASSIGN(auto client, ControlClient::connect(options));
-  const auto first = client->post_event(ping_event(), 1, Duration::zero(), kPatience);
+  const auto first = client->post_event(ping_event(), 1, Duration::zero(), kClientPatience);
   if (!first) return std::unexpected(first.error());
   PLCHOST_TRY_ASSIGN(const auto pool, ObjectPool::attach(cell.pool()));
   PLCHOST_TRY_ASSIGN(const auto event, pool.open_event("probe/ping"));
@@ -149,14 +149,14 @@ Result<std::vector<Row>> measure_post_many(const Plan& plan) {
   constexpr std::uint32_t kFirstDomain = 20;
   const auto salt = static_cast<std::uint32_t>(::getpid()) % 40U;
   const DdsDomains domains{.plchost = kFirstDomain + 2 * salt, .bare = kFirstDomain + 2 * salt + 1};
-  return measure_beside<Board>(
-      [&](Processes& processes, Board& board) {
+  return measure_beside<ClientBoard>(
+      [&](Processes& processes, ClientBoard& board) {
         for (std::uint32_t i = 0; i < kClients; ++i)
           processes.fork([&, i] { run_client(domains, board, i); });
         for (std::uint32_t i = 1; i <= kFloods; ++i)
           processes.fork([&, i] { run_client(domains, board, kClients + i); });
       },
-      [&](Board& board) { return measure(plan, domains, board); });
+      [&](ClientBoard& board) { return measure(plan, domains, board); });
 }
 
 }  // namespace plchost::bench

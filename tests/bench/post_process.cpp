@@ -20,10 +20,10 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kSlice = std::chrono::seconds(1);
+constexpr Duration kPostProcessSlice = std::chrono::seconds(1);
 
 /// Shared by the poster and the measured process.
-struct Board {
+struct PostBoard {
   std::atomic<std::int64_t> posted_ns{0};
   std::atomic<std::uint32_t> word{0};      // the floor's futex word
   std::atomic<std::uint32_t> answered{0};  // posts that arrived
@@ -35,7 +35,7 @@ enum class Kind : std::uint8_t { ours, floor };
 struct Setting {
   const Plan& plan;
   int poster_core;
-  Board& board;
+  PostBoard& board;
   const std::string& pool;
   const PoolEvent& event;
 };
@@ -52,7 +52,7 @@ int run_poster(const Setting& setting, Kind kind, std::int64_t posts) {
   if (!pool) return 1;
   const auto event = pool->open_event("bench/ping");
   if (!event) return 1;
-  Board& board = setting.board;
+  PostBoard& board = setting.board;
   for (std::int64_t i = 0; i < posts; ++i) {
     const std::uint32_t before = board.answered.load();
     sleep_for(setting.plan.post_gap);
@@ -69,7 +69,7 @@ int run_poster(const Setting& setting, Kind kind, std::int64_t posts) {
   return 0;
 }
 
-Duration since(const Board& board) {
+Duration since(const PostBoard& board) {
   return MonotonicClock::now() - TimePoint(Duration(board.posted_ns.load(std::memory_order_relaxed)));
 }
 
@@ -86,7 +86,7 @@ Result<void> post(const Setting& setting, Kind kind, std::int64_t posts) {
 
 Result<void> run_floor(const Setting& setting, Duration slice, Samples& into) {
   const auto posts = slice / setting.plan.post_gap;
-  Board& board = setting.board;
+  PostBoard& board = setting.board;
   Samples samples(static_cast<std::size_t>(posts));
   std::atomic<bool> stop{false};
   std::uint32_t seen = board.word.load();
@@ -142,7 +142,7 @@ Result<Row> measure(const Setting& setting, std::string name) {
   auto done = alternate(setting.plan,
                         {[&](Duration slice) { return run_floor(setting, slice, row.floor); },
                          [&](Duration slice) { return run_ours(setting, slice, row.ours); }},
-                        kSlice);
+                        kPostProcessSlice);
   if (!done) return std::unexpected(std::move(done.error()));
   row.targets = {{"median below 1.15 x a raw futex wake", "us", summarise(row.ours).p50,
                   1.15 * summarise(row.floor).p50}};
@@ -152,9 +152,10 @@ Result<Row> measure(const Setting& setting, std::string name) {
 }  // namespace
 
 Result<std::vector<Row>> measure_post_process(const Plan& plan) {
-  void* memory = ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void* memory =
+      ::mmap(nullptr, sizeof(PostBoard), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "mmap", errno);
-  auto* board = new (memory) Board;
+  auto* board = new (memory) PostBoard;
   const std::string name = own_name("bench");
   PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::create(name));
   auto event = pool.create_event("bench/ping");
@@ -171,7 +172,7 @@ Result<std::vector<Row>> measure_post_process(const Plan& plan) {
     rows.push_back(std::move(*row));
   }
   ObjectPool::remove(name);
-  ::munmap(memory, sizeof(Board));
+  ::munmap(memory, sizeof(PostBoard));
   if (!done) return std::unexpected(std::move(done.error()));
   return rows;
 }

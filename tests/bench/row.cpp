@@ -49,7 +49,7 @@ ordered_json figures(const Range& range, Get get) {
 }
 
 /// Of what is a number.
-double median(std::vector<double> values) {
+double median_of(std::vector<double> values) {
   std::erase_if(values, [](double value) { return std::isnan(value); });
   if (values.empty()) return kNotMeasured;
   std::ranges::sort(values);
@@ -196,7 +196,7 @@ void take_medians(Row& row) {
   const auto over = [&](auto get) {
     std::vector<double> values;
     std::ranges::transform(row.rounds, std::back_inserter(values), get);
-    return median(std::move(values));
+    return median_of(std::move(values));
   };
   for (auto& [key, value] : row.extra)
     value = over([&](const Round& round) { return value_of(round.extra, key); });

@@ -17,8 +17,8 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kWork = std::chrono::microseconds(15);
-constexpr std::array kSizes = {std::size_t{10}, std::size_t{100}, std::size_t{1000}};
+constexpr Duration kScaleWork = std::chrono::microseconds(15);
+constexpr std::array kTaskCounts = {std::size_t{10}, std::size_t{100}, std::size_t{1000}};
 
 /// Of each 20 tasks 1, 2, 5 and 12 have these periods: 21,000 activations per second of 1,000 tasks.
 struct Period {
@@ -39,7 +39,7 @@ const Period& period_of(std::size_t task) {
   return kPeriods.back();
 }
 
-struct Figures {
+struct ScaleFigures {
   std::uint64_t cycles = 0;
   std::uint64_t lost = 0;
   Duration cpu{};
@@ -51,7 +51,7 @@ struct Figures {
 
 /// Measures while something runs; `cycles` and `lost` say how much of it ran so far.
 template <class Cycles, class Lost>
-void measure_slice(const Plan& plan, Duration slice, Figures& into, Cycles cycles, Lost lost) {
+void measure_slice(const Plan& plan, Duration slice, ScaleFigures& into, Cycles cycles, Lost lost) {
   const OnCore out_of_the_way(plan.poster_core);
   std::this_thread::sleep_for(kWarmUp);
   const std::uint64_t cycles_before = cycles();
@@ -65,18 +65,18 @@ void measure_slice(const Plan& plan, Duration slice, Figures& into, Cycles cycle
   into.lost += lost() - lost_before;
   into.cpu += cpu;
   into.measured += MonotonicClock::now() - begin;
-  if (ran > 0) into.cpu_per_activation.push(cpu / static_cast<Duration::rep>(ran) - kWork);
+  if (ran > 0) into.cpu_per_activation.push(cpu / static_cast<Duration::rep>(ran) - kScaleWork);
 }
 
 Result<void> run_ours(const Plan& plan, std::string_view scheduler, std::size_t size, Duration slice,
-                      Figures& into) {
+                      ScaleFigures& into) {
   std::vector<TaskConfig> configs;
   for (std::size_t i = 0; i < size; ++i) {
     TaskConfig task;
     task.name = fmt::format("task{}", i);
     task.interval = period_of(i).interval;
     task.iec_priority = period_of(i).iec_priority;
-    task.entry = [] { work(kWork); };
+    task.entry = [] { work(kScaleWork); };
     configs.push_back(std::move(task));
   }
   PLCHOST_TRY_ASSIGN(const auto tasks, ManyTasks::start(plan, scheduler, std::move(configs)));
@@ -95,7 +95,7 @@ struct Bare {
     for (TimePoint release = origin; !stopping.load(std::memory_order_relaxed);) {
       const timespec until = to_timespec(release);
       ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
-      work(kWork);
+      work(kScaleWork);
       cycles.fetch_add(1, std::memory_order_relaxed);
       const TimePoint end = MonotonicClock::now();
       for (release += interval; release < end; release += interval)
@@ -104,7 +104,7 @@ struct Bare {
   }
 };
 
-Result<void> run_floor(const Plan& plan, std::size_t size, Duration slice, Figures& into) {
+Result<void> run_floor(const Plan& plan, std::size_t size, Duration slice, ScaleFigures& into) {
   Bare bare{.origin = MonotonicClock::now() + std::chrono::milliseconds(100)};
   std::vector<Thread> threads;
   Result<void> started;
@@ -130,14 +130,14 @@ Result<void> run_floor(const Plan& plan, std::size_t size, Duration slice, Figur
 }
 
 /// All sizes of one scheduler, or of the floor.
-using Sizes = std::array<Figures, kSizes.size()>;
+using Sizes = std::array<ScaleFigures, kTaskCounts.size()>;
 
-double per_million(const Figures& figures) {
+double per_million(const ScaleFigures& figures) {
   return 1e6 * ratio(static_cast<double>(figures.lost), static_cast<double>(figures.cycles + figures.lost));
 }
 
 Row to_row(std::string_view scheduler, const Sizes& ours, const Sizes& floor) {
-  const auto cost = [](const Figures& figures) { return summarise(figures.cpu_per_activation).p50; };
+  const auto cost = [](const ScaleFigures& figures) { return summarise(figures.cpu_per_activation).p50; };
   // A tick each ms and two changes of thread for each activation, or one timer and one change.
   const double most = scheduler == "CmpSchedule" ? 3 : 2;
   return {.name = fmt::format("scale/{}/1000tasks", scheduler),
@@ -180,11 +180,11 @@ Result<void> measure_idle_tick(const Plan& plan, std::size_t size, Duration slic
 
 Result<Row> measure_ticks(const Plan& plan) {
   Row row{.name = "scale/CmpSchedule/tick", .sample = "a slice's mean of a tick"};
-  auto done =
-      alternate(plan,
-                {[&](Duration slice) { return measure_idle_tick(plan, kSizes.front(), slice, row.floor); },
-                 [&](Duration slice) { return measure_idle_tick(plan, kSizes.back(), slice, row.ours); }},
-                std::chrono::seconds(1));
+  auto done = alternate(
+      plan,
+      {[&](Duration slice) { return measure_idle_tick(plan, kTaskCounts.front(), slice, row.floor); },
+       [&](Duration slice) { return measure_idle_tick(plan, kTaskCounts.back(), slice, row.ours); }},
+      std::chrono::seconds(1));
   if (!done) return std::unexpected(std::move(done.error()));
   row.targets = {{"a tick with 1,000 tasks that are not due at most 1.2 times one with 10", "us",
                   summarise(row.ours).p50, 1.2 * summarise(row.floor).p50, true}};
@@ -196,14 +196,15 @@ Result<Row> measure_ticks(const Plan& plan) {
 
 Result<std::vector<Row>> measure_scale(const Plan& plan) {
   std::vector<Sizes> figures(all_schedulers().size() + 1);
-  for (std::size_t size = 0; size < kSizes.size(); ++size) {
+  for (std::size_t size = 0; size < kTaskCounts.size(); ++size) {
     Plan share = plan;
-    if (kSizes[size] != kSizes.back()) share.each = plan.each / 4;
-    std::vector<Subject> subjects{
-        [&, size](Duration slice) { return run_floor(plan, kSizes[size], slice, figures.back()[size]); }};
+    if (kTaskCounts[size] != kTaskCounts.back()) share.each = plan.each / 4;
+    std::vector<Subject> subjects{[&, size](Duration slice) {
+      return run_floor(plan, kTaskCounts[size], slice, figures.back()[size]);
+    }};
     for (std::size_t i = 0; i < all_schedulers().size(); ++i) {
       subjects.emplace_back([&, size, i](Duration slice) {
-        return run_ours(plan, all_schedulers()[i].name, kSizes[size], slice, figures[i][size]);
+        return run_ours(plan, all_schedulers()[i].name, kTaskCounts[size], slice, figures[i][size]);
       });
     }
     PLCHOST_TRY(alternate(share, subjects));

@@ -19,7 +19,7 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr auto kPatience = std::chrono::seconds(10);
+constexpr auto kStartPatience = std::chrono::seconds(10);
 
 Result<void> measure_one(const std::vector<std::string>& arguments, StartBoard& board, Samples& into) {
   board.first_cycle_ns.store(0);
@@ -27,7 +27,7 @@ Result<void> measure_one(const std::vector<std::string>& arguments, StartBoard& 
   auto child = Child::start(arguments);
   if (!child) return std::unexpected(std::move(child.error()));
   while (board.first_cycle_ns.load() == 0) {
-    if (MonotonicClock::now() - began > kPatience)
+    if (MonotonicClock::now() - began > kStartPatience)
       return failure(ErrorCode::timed_out, arguments.front() + ": no cycle ran");
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

@@ -22,8 +22,7 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kPeriod = std::chrono::milliseconds(1);
-constexpr auto kPatience = std::chrono::seconds(10);
+constexpr auto kInstancePatience = std::chrono::seconds(10);
 constexpr std::string_view kInstance = "text";
 
 /// Inputs, outputs, a timer and a little work, as a small control program has them.
@@ -69,7 +68,7 @@ Result<InstancePageReader> page_of(pid_t pid, const std::string& pool) {
     auto page = InstancePageReader::open(pool, kInstance);
     const auto runtime = page ? page->runtime() : std::nullopt;
     if (runtime && runtime->pid == pid && runtime->running != 0) return page;
-    if (MonotonicClock::now() - begin > kPatience)
+    if (MonotonicClock::now() - begin > kInstancePatience)
       return failure(ErrorCode::timed_out, "plc-instance does not run the program in Structured Text");
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
@@ -113,8 +112,8 @@ Result<std::string> build(const Plan& plan, const IecCompiler& compiler, const s
 
 Result<void> measure_all(const Plan& plan, const std::string& pool, std::vector<TextTask>& tasks,
                          CyclicFigures& floor) {
-  BareLoop bare(Wait::sleep, kPeriod);
-  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor)};
+  BareLoop bare(Wait::sleep, kCyclePeriod);
+  std::vector<Subject> subjects{slices_of(plan, bare, kCyclePeriod, floor)};
   for (TextTask& task : tasks)
     subjects.emplace_back([&](Duration slice) { return measure_slice(plan, pool, task, slice); });
   return alternate(plan, subjects);
