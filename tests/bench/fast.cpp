@@ -43,8 +43,8 @@ Result<Row> measure_period(const Plan& plan, Duration period) {
                 {"cpu_share_of_core", ratio(to_us(ours.usage.cpu), to_us(ours.measured))},
                 {"sleep_p50_us", plain.p50},
                 {"sleep_p99_us", plain.p99}},
-      .targets = {{"lost cycles at most twice those of F at the same period, and 100 in a million",
-                   "per million", ours.lost_per_million(), 2 * slept.lost_per_million() + 100, true}},
+      .targets = {lost_cycles_target("F at the same period", ours.lost_per_million(),
+                                     slept.lost_per_million())},
       .note =
           "floor: a bare loop that only spins, from which the kernel takes up to 5 % of the core if others "
           "wait; sleep_*: F at the same period"};

@@ -212,6 +212,15 @@ void take_medians(Row& row) {
 
 }  // namespace
 
+Target lost_cycles_target(std::string_view floor_text, double lost, double floor) {
+  constexpr double kNoise = 1000;
+  return {.text = fmt::format("lost cycles at most twice those of {}, and 100 in a million", floor_text),
+          .unit = "per million",
+          .measured = lost,
+          .bound = floor <= kNoise ? 2 * floor + 100 : kNotMeasured,
+          .or_equal = true};
+}
+
 void add_round(std::vector<Row>& all, std::vector<Row> round) {
   for (Row& one : round) {
     auto row = std::ranges::find_if(

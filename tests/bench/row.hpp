@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,12 @@ struct Target {
     return or_equal ? measured <= bound : measured < bound;  // neither, if one of them is not a number
   }
 };
+
+/// Lost cycles in a million: at most twice those of `floor`, and 100.
+/// Not decided in a round whose floor loses more than 1,000. A bound that follows the machine's noise would
+/// admit everything.
+/// @param floor_text names the floor, "F at the same period"
+[[nodiscard]] Target lost_cycles_target(std::string_view floor_text, double lost, double floor);
 
 /// A curve over time, for a picture: seconds since the start, nanoseconds.
 struct Series {

@@ -49,6 +49,15 @@ TEST(Samples, ThatDoNotFitAreCountedAndTheGreatestIsTheMaximum) {
   EXPECT_EQ(json[0]["floor_dropped_samples"], 0);
 }
 
+TEST(LostCycles, HaveABoundOnlyBesideAFloorThatLosesFew) {
+  const Target beside_few = lost_cycles_target("F", 1100, 500);
+  EXPECT_EQ(beside_few.text, "lost cycles at most twice those of F, and 100 in a million");
+  EXPECT_TRUE(beside_few.met());
+  EXPECT_FALSE(lost_cycles_target("F", 1101, 500).met());
+  EXPECT_EQ(lost_cycles_target("F", 0, 1000).bound, 2100);
+  EXPECT_FALSE(lost_cycles_target("F", 0, 1001).decided()) << "the bound would follow the noise";
+}
+
 TEST(Summary, HasNoPercentileThatNoSampleLiesAbove) {
   EXPECT_TRUE(std::isnan(summarise(Samples()).max));
   EXPECT_EQ(summarise(one_to(1)).p50, 1) << "the mean of the one slice of a round";
