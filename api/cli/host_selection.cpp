@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "api/client/at_once.hpp"
 #include "api/dds/object_query.hpp"
 
 namespace plchost {
@@ -28,28 +29,8 @@ bool HostSelection::selects(const HostView& view) const {
 
 namespace {
 
-// The next host that nobody has asked yet, until none is left.
-Async<bool> ask_next(ClientCore& core, std::vector<HostOutcome>& outcomes, std::size_t& next,
-                     const HostCall& call) {
-  while (next < outcomes.size()) {
-    HostOutcome& outcome = outcomes[next++];
-    outcome.reply = co_await call(core, outcome.host);
-  }
-  core.pump().look_again();
-  co_return true;
-}
-
-Async<bool> ask_all(ClientCore& core, std::vector<HostOutcome>& outcomes, const HostCall& call) {
-  constexpr std::size_t kAtOnce = 16;
-  std::size_t next = 0;
-  std::vector<Async<bool>> askers;
-  for (std::size_t i = 0; i < kAtOnce; ++i) {
-    askers.push_back(ask_next(core, outcomes, next, call));
-    askers.back().start();
-  }
-  for (const Async<bool>& asker : askers) {
-    while (!asker.done()) co_await core.pump().change(kNoDeadline);
-  }
+Async<bool> ask(ClientCore& core, HostOutcome& outcome, const HostCall& call) {
+  outcome.reply = co_await call(core, outcome.host);
   co_return true;
 }
 
@@ -61,7 +42,8 @@ std::vector<HostOutcome> ask_each(ControlClient& client, const std::vector<std::
   for (const std::string& host : hosts) {
     outcomes.push_back({.host = host, .reply = failure(ErrorCode::timed_out, "not asked")});
   }
-  (void)client.wait(ask_all(client.core(), outcomes, call));
+  (void)client.wait(all_at_once(client.core().pump(), outcomes.size(),
+                                [&](std::size_t i) { return ask(client.core(), outcomes[i], call); }));
   return outcomes;
 }
 

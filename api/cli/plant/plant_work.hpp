@@ -37,7 +37,7 @@ struct PlantWork {
 
 /// Looks at all hosts of the plant that are selected, at the same time, and brings them to what they are to
 /// be. In the order of the file. If a finding is `refused`, nothing was changed on any host.
-[[nodiscard]] std::vector<PlantFinding> work_on(const Plant& plant, const HostSelection& selection,
-                                                const dds::DomainOptions& options, const PlantWork& work);
+[[nodiscard]] std::vector<PlantFinding> work_on(ControlClient& client, const Plant& plant,
+                                                const HostSelection& selection, const PlantWork& work);
 
 }  // namespace plchost

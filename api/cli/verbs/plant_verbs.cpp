@@ -70,15 +70,20 @@ int exit_code(const std::vector<PlantFinding>& findings, bool apply) {
   return missing ? kExitNoAnswer : kExitDone;
 }
 
-int work(const CliSession& session, const std::string& file, bool apply) {
+int work(CliSession& session, const std::string& file, bool apply) {
   const auto plant = load_plant(file);
   if (!plant) {
     for (const std::string& error : plant.error()) fmt::print(stderr, "plcctl: {}\n", printable(error));
     return kExitUsage;
   }
+  const auto client = session.client();
+  if (!client) {
+    const int code = CliSession::fail(client.error());
+    return apply ? code : kDiffFailed;
+  }
   const Duration patience = session.timeout();
   const auto findings = work_on(
-      *plant, session.options.hosts, session.options.dds,
+      **client, *plant, session.options.hosts,
       {.apply = apply,
        .patience = patience,
        .command_patience = session.options.timeout_given ? patience : std::max(patience, kLongCommand)});
