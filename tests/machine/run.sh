@@ -57,7 +57,7 @@ fi
 # The root has all that the packages depend on: the machine has no network.
 if [ ! -e "$root/made" ]; then
   rm -rf "$root"
-  archive=$(cat /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null |
+  archive=$({ cat /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null || true; } |
     sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\).*/\2/p' | grep -m1 '/debian/\?$') || cannot "apt's sources name no Debian archive"
   debootstrap --variant=minbase --include=ca-certificates,dbus,jq,procps,systemd-sysv "$suite" "$root" "$archive" >"$log" 2>&1 ||
     cannot "$(tail -n 1 "$log")"
