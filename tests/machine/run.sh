@@ -1,29 +1,35 @@
 #!/usr/bin/env bash
-# Stories of the packages on a machine of its own: a bare Debian that boots systemd as process 1, in a container.
-#   tests/machine/run.sh [--packages FOLDER] [SUITE]
+# Stories of the packages on a machine of its own: a bare Debian that boots systemd as process 1.
+#   tests/machine/run.sh [--packages FOLDER] [--container | --rt] [SUITE]
 # SUITE: bookworm or trixie; default: the Debian of this machine. FOLDER: the packages for it, from manager/package.sh, which is
-# called without this option. The Debian is kept in .build/machine; a story changes nothing in it.
+# called without this option. The machine is QEMU with Debian's kernel; --rt: with its real-time kernel and an isolated core;
+# --container: systemd-nspawn, in seconds. The Debian is kept in .build/machine; a story changes nothing in it.
 # As root. Exit code 77: no such machine can be made here, and nothing was tested.
 set -euo pipefail
 
 packages=
+kind=emulated kernel=linux-image-amd64 kernel_line=
 suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
 while [ $# -gt 0 ]; do
   case "$1" in
     --packages) packages=$(realpath -e "${2:?"--packages needs a folder"}") && shift ;;
+    --container) kind=container ;;
+    --rt) kernel=linux-image-rt-amd64 kernel_line="isolcpus=1 nohz_full=1 rcu_nocbs=1" ;;
     -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit ;;
-    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages and --help" >&2; exit 2 ;;
+    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages, --container, --rt and --help" >&2; exit 2 ;;
     *) suite=$1 ;;
   esac
   shift
 done
 cd "$(dirname "$0")/../.."
-root=$PWD/.build/machine/$suite
+root=$PWD/.build/machine/$suite-$kind
+[ "$kind" = container ] || root+=-${kernel#linux-image-}
 work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-machine.XXXXXX")
 log=$work/log
-container=
+applications=$work/applications
+machine=
 clean_up() {
-  [ -z "$container" ] || { kill "$container" && wait "$container"; } 2>/dev/null || true
+  [ -z "$machine" ] || { kill "$machine" && wait "$machine"; } 2>/dev/null || true
   rm -rf "$work"
 }
 trap clean_up EXIT
@@ -31,7 +37,7 @@ trap 'exit 130' INT TERM
 fail() {
   echo "FAILED: $*" >&2
   tail -n 30 "$log" >&2
-  [ -z "$container" ] || on_machine journalctl -q --no-pager -n 40 -u plchostd >&2 || true
+  [ -z "$machine" ] || on_machine journalctl -q --no-pager -n 40 -u plchostd >&2 || true
   exit 1
 }
 cannot() { echo "no machine can be made here: $*; nothing was tested" >&2; exit 77; }
@@ -46,8 +52,10 @@ until_true() { # until_true SECONDS COMMAND...
 story() { echo "- $*"; }
 
 [ "$(id -u)" -eq 0 ] || cannot "only root can"
-for program in debootstrap systemd-nspawn g++; do
-  command -v "$program" >/dev/null || cannot "$program is missing (packages debootstrap, systemd-container, g++)"
+machine_environment=(HOME=/root TERM=dumb LC_ALL=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive)
+. "tests/machine/$kind.sh"
+for program in "${machine_programs[@]}" g++; do
+  command -v "$program" >/dev/null || cannot "$program is missing; .ci/packages machine installs all that is needed"
 done
 if [ -z "$packages" ]; then
   packages=$PWD/.build/packages
@@ -59,10 +67,11 @@ if [ ! -e "$root/made" ]; then
   rm -rf "$root"
   archive=$({ cat /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null || true; } |
     sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\).*/\2/p' | grep -m1 '/debian/\?$') || cannot "apt's sources name no Debian archive"
-  debootstrap --variant=minbase --include=ca-certificates,dbus,jq,procps,systemd-sysv "$suite" "$root" "$archive" >"$log" 2>&1 ||
+  debootstrap --variant=minbase --include="$machine_packages" "$suite" "$root" "$archive" >"$log" 2>&1 ||
     cannot "$(tail -n 1 "$log")"
   touch "$root/made"
 fi
+rm -f "$root/etc/resolv.conf"
 cp /etc/resolv.conf "$root/etc/"
 cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/"
 needed=$(for package in "$packages"/*.deb; do dpkg-deb -f "$package" Depends | tr ',' '\n' | sed 's/^ *//' | grep -vE '^(libplc|plchost)'; done |
@@ -70,9 +79,9 @@ needed=$(for package in "$packages"/*.deb; do dpkg-deb -f "$package" Depends | t
 chroot "$root" sh -c 'apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -q satisfy -y --no-install-recommends "$1"' _ "$needed" \
   >"$log" 2>&1 || cannot "its packages cannot be installed: $(tail -n 1 "$log")"
 
-mkdir "$work/applications"
-g++ -std=c++20 -O2 -shared -fPIC -I instances -o "$work/applications/bottling_line.so" instances/examples/bottling_line/*.cpp
-cat >"$work/applications/instances" <<'EOF'
+mkdir "$applications"
+g++ -std=c++20 -O2 -shared -fPIC -I instances -o "$applications/bottling_line.so" instances/examples/bottling_line/*.cpp
+cat >"$applications/instances" <<'EOF'
 
 [[instance]]
 name = "line1"
@@ -87,17 +96,11 @@ share_core = true
 application = "/applications/bottling_line.so"
 EOF
 
-systemd-nspawn -q -D "$root" --volatile=overlay --register=no --keep-unit --private-network --capability=CAP_IPC_LOCK \
-  --bind-ro="$packages:/packages" --bind-ro="$work/applications:/applications" -b --console=read-only >"$work/console" 2>&1 </dev/null &
-container=$!
-first_process() { leader=$(pgrep -P "$container" -x systemd); }
-on_machine() { nsenter -t "$leader" -a -- env -i HOME=/root TERM=dumb LC_ALL=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive "$@"; }
 has_booted() { on_machine systemctl is-system-running | grep -qE 'running|degraded'; }
-has_ended() { ! kill -0 "$container" 2>/dev/null; }
-for ((i = 0; i < 50; i++)); do first_process && break; has_ended && cannot "$(tail -n 1 "$work/console")"; sleep 0.2; done
-until_true 60 has_booted
+machine_start
+until_true 180 has_booted
 
-plcctl() { on_machine plcctl --timeout 10 "$@"; }
+plcctl() { on_machine plcctl --timeout 20 "$@"; }
 files() {
   on_machine find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /var/log -o -path /var/cache \
     -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/lib/systemd -o -path /packages -o -path /applications \) -prune -o -print | sort
@@ -106,21 +109,25 @@ manager() { on_machine systemctl show -p MainPID --value plchostd; }
 instances() { plcctl list instances --json | jq -c '[.[] | {name, pid, state}] | sort_by(.name)'; }
 cycles() { plcctl list tasks --json | jq "[.[] | select(.instance == \"line1\")] | map(.$1) | add"; }
 run() { plcctl wait instance line1 line2 --timeout 30 && [ "$(on_machine systemctl is-active plchostd)" = active ]; }
-# ends_no_plc WHAT COMMAND...: another manager, the same processes of the instances. Cycles that are lost in the same time
-# without the command do not count; a machine that stands still gets further rounds.
+# ends_no_plc WHAT COMMAND...: another manager, the same processes of the instances, and their cycles go on. Cycles that are lost
+# in the same time without the command do not count. A machine that stands still gets further rounds. An emulated one loses
+# cycles all the time, and is not asked for them.
 ends_no_plc() {
-  local what=$1 before=$shown other round lost control at
+  local what=$1 before=$shown other round lost control at ran now
   shift
   for ((round = 1; round <= 5; round++)); do
     at=$(cycles lost_cycles)
     sleep 5
     control=$(($(cycles lost_cycles) - at))
-    other=$(manager) at=$(cycles lost_cycles)
+    other=$(manager) at=$(cycles lost_cycles) ran=$(cycles cycles)
     "$@" >"$log" 2>&1 || fail "$what"
     is_another() { [ "$(manager)" != "$other" ] && [ "$(manager)" != 0 ] && run; }
-    until_true 40 is_another
+    until_true 60 is_another
     lost=$(($(cycles lost_cycles) - at))
     [ "$(instances)" = "$before" ] || fail "$what: $before before it, $(instances) after it"
+    now=$(cycles cycles)
+    [ "$now" -gt "$ran" ] || fail "$what: line1 had run $ran cycles before it, and $now after it"
+    [ "$machine_is_emulated" = no ] || return 0
     [ "$lost" -gt "$control" ] || break
     echo "  further round: $what: line1 lost $lost cycles, $control without it"
   done
@@ -131,13 +138,13 @@ story "the packages are installed, and the service runs without an instance"
 without=$(files)
 on_machine sh -c 'apt-get -q install -y --no-install-recommends /packages/*.deb' >"$log" 2>&1 || fail "the packages cannot be installed"
 sees_host() { [ "$(plcctl list hosts --json | jq -r ".[].host")" = plchost ]; }
-until_true 20 sees_host
+until_true 60 sees_host
 [ "$(on_machine systemctl is-active plchostd)" = active ] || fail "the service does not run"
 [ "$(on_machine python3 -c 'import plchost_client; print(plchost_client.Client(timeout=10).hosts()[0].name)')" = plchost ] || fail "Python sees no host"
 
 story "two instances come by a reload of the service"
 on_machine sh -c 'cat /applications/instances >>/etc/plchost/plchost.toml && systemctl reload plchostd' >"$log" 2>&1 || fail "the reload"
-until_true 20 plcctl start instance line1 line2
+until_true 60 plcctl start instance line1 line2
 run || fail "they do not run"
 shown=$(instances)
 
@@ -152,7 +159,7 @@ on_machine systemctl stop plchostd
 [ "$(on_machine pgrep -c plc-instance)" = 0 ] || fail "instances run on after a stop"
 [ -z "$(on_machine ls /dev/shm)" ] || fail "left in /dev/shm: $(on_machine ls /dev/shm)"
 on_machine systemctl start plchostd
-until_true 20 run
+until_true 60 run
 
 story "a removal keeps the state, and a purge leaves nothing"
 on_machine apt-get -q remove -y plchost >"$log" 2>&1 || fail "the removal"
