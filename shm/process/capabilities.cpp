@@ -1,0 +1,50 @@
+#include "shm/process/capabilities.hpp"
+
+#include <array>
+#include <cstdint>
+
+#include <linux/capability.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+
+namespace plchost {
+
+namespace {
+
+using Capabilities = std::array<std::uint32_t, _LINUX_CAPABILITY_U32S_3>;
+
+// The system calls: libcap would be a dependency of each instance.
+Result<void> take_away(const Capabilities& given_up) {
+  __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
+  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> rights{};
+  PLCHOST_TRY(check_errno(::syscall(SYS_capget, &header, rights.data()), "cannot read the capabilities"));
+  for (std::size_t i = 0; i < rights.size(); ++i) {
+    rights[i].effective &= ~given_up[i];
+    rights[i].permitted &= ~given_up[i];
+    rights[i].inheritable &= ~given_up[i];
+  }
+  PLCHOST_TRY(check_errno(::syscall(SYS_capset, &header, rights.data()), "cannot give up capabilities"));
+  return {};
+}
+
+}  // namespace
+
+Result<void> give_up_capabilities(std::initializer_list<unsigned> given_up) {
+  constexpr unsigned kBits = 32;
+  Capabilities bits{};
+  for (const unsigned one : given_up) bits.at(one / kBits) |= std::uint32_t{1} << (one % kBits);
+  return take_away(bits);
+}
+
+Result<void> give_up_all_capabilities() {
+  return take_away({UINT32_MAX, UINT32_MAX});
+}
+
+bool never_gains_rights() noexcept {
+  return ::prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0) == 1;
+}
+
+}  // namespace plchost
