@@ -11,6 +11,7 @@
 
 #include "api/control/application_versions.hpp"
 #include "api/control/exit_codes.hpp"
+#include "manager/config/accounts.hpp"
 #include "manager/system/service_manager.hpp"
 #include "shm/log/log.hpp"
 
@@ -69,8 +70,13 @@ void ApiServer::begin_anew() {
   spdlog::info("API server: ends, because its configuration has changed");
   renewing_ = true;
   beat_timer_.cancel();
-  (void)signal_process(*process_, SIGTERM);
+  signal(*process_, SIGTERM);
   timer_.set(MonotonicClock::now() + kEndLimit);
+}
+
+void ApiServer::signal(const ChildProcess& process, int signal) const {
+  const auto sent = user_ ? signal_process_of(*user_, process, signal) : signal_process(process, signal);
+  if (!sent) spdlog::error("API server: {}", sent.error().describe());
 }
 
 std::vector<std::string> ApiServer::arguments() const {
@@ -116,6 +122,10 @@ std::vector<std::string> ApiServer::arguments() const {
     arguments.emplace_back("--identity");
     arguments.push_back(config_.dds.identity);
   }
+  if (!config_.dds.user.empty()) {
+    arguments.emplace_back("--user");
+    arguments.push_back(config_.dds.user);
+  }
   if (config_.dds.allow_unsecured) arguments.emplace_back("--allow-unsecured");
   if (!config_.dds.multicast) arguments.emplace_back("--no-multicast");
   if (beats_) {
@@ -132,6 +142,8 @@ std::vector<std::string> ApiServer::arguments() const {
 void ApiServer::spawn() {
   network_ = config_.dds;
   domain_ = config_.host.dds_domain;
+  const auto user = user_number(config_.dds.user);
+  user_ = !config_.dds.user.empty() && user ? std::optional(*user) : std::nullopt;
   spawned_ = MonotonicClock::now();
   if (name_since_ns_ == 0) name_since_ns_ = unix_time_ns();
   beats_.reset(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
@@ -148,7 +160,7 @@ void ApiServer::spawn() {
       if (beats_) look_at_beats();
       return;
     }
-    (void)signal_process(*process, SIGKILL);
+    signal(*process, SIGKILL);
     spdlog::error("API server: {}", watch.error().describe());
   } else {
     spdlog::error("API server: {}", process.error().describe());
@@ -197,7 +209,7 @@ void ApiServer::on_timer() {
   }
   if (!shut_down_ && !renewing_) return start();
   spdlog::warn("API server: does not end; it is killed");
-  if (process_) (void)signal_process(*process_, SIGKILL);
+  if (process_) signal(*process_, SIGKILL);
 }
 
 bool ApiServer::beats_since() const {
@@ -216,7 +228,7 @@ void ApiServer::look_at_beats() {
   heartbeat_.look(now, beats_counted_);
   if (!heartbeat_.silent()) return beat_timer_.set(now + HeartbeatWatch::kLongestGap);
   spdlog::error("API server: {}; it is killed", beats_counted_ == 0 ? "does not come up" : "stands still");
-  (void)signal_process(*process_, SIGKILL);
+  signal(*process_, SIGKILL);
 }
 
 void ApiServer::shut_down(std::function<void()> done) {
@@ -225,7 +237,7 @@ void ApiServer::shut_down(std::function<void()> done) {
   renew_timer_.cancel();
   if (!process_) return done();
   shut_down_ = std::move(done);
-  (void)signal_process(*process_, SIGTERM);
+  signal(*process_, SIGTERM);
   timer_.set(MonotonicClock::now() + kEndLimit);
 }
 

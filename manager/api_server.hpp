@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/types.h>
+
 #include "manager/config/manager_config.hpp"
 #include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/system/child_process.hpp"
@@ -50,12 +52,14 @@ class ApiServer {
   [[nodiscard]] bool beats_since() const;
   [[nodiscard]] bool has_served() const;
   [[nodiscard]] std::vector<std::string> arguments() const;
+  void signal(const ChildProcess& process, int signal) const;
 
   Reactor& reactor_;
   const ManagerConfig& config_;
   std::string program_;
   std::function<bool()> is_asked_;
   std::optional<ChildProcess> process_;
+  std::optional<uid_t> user_;  ///< of its own
   Reactor::Watch exit_watch_;
   Reactor::Timer timer_;
   Reactor::Timer beat_timer_;

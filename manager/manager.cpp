@@ -15,9 +15,11 @@
 #include "api/control/application_versions.hpp"
 #include "api/control/control_handler.hpp"
 #include "instances/launch/core_latency.hpp"
+#include "manager/config/accounts.hpp"
 #include "manager/host_check/host_check.hpp"
 #include "manager/pool_rights.hpp"
 #include "manager/retain_memories.hpp"
+#include "manager/server_files.hpp"
 #include "manager/store/store_process.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
@@ -28,6 +30,7 @@
 #include "shm/files/own_folder.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/foreign_files.hpp"
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/reference_clock.hpp"
@@ -156,6 +159,26 @@ Result<void> Manager::check_state_folders() {
   return {};
 }
 
+bool Manager::server_has_own_user() const noexcept {
+  return config_.dds.enabled && !config_.dds.user.empty();
+}
+
+// A server that lacks something says so itself; a disk that hangs keeps no instance from its start.
+void Manager::share_with_server() {
+  if (!server_has_own_user()) return;
+  give_roots_files(config_.host.pool, ::getegid());
+  const std::string audit = audit_folder(config_.host);
+  const std::string applications = applications_folder(config_.host.state_directory, config_.host.name);
+  const auto share = [audit, applications]() -> Result<void> {
+    for (const std::string& folder : {audit, audit + "/refused", audit + "/under_way"})
+      PLCHOST_TRY(share_folder(folder, GroupRight::writes));
+    return share_folder(applications, GroupRight::reads);
+  };
+  const auto shared = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
+  const auto& error = shared ? *shared : std::unexpected(shared.error());
+  if (!error) spdlog::error("the API server may lack files: {}", error.error().describe());
+}
+
 Result<void> Manager::set_up() {
   const HostConfig& host = config_.host;
   if (auto free = check_pool_is_free(host.pool); !free) return free;
@@ -167,7 +190,9 @@ Result<void> Manager::set_up() {
     spdlog::warn("cannot bind the manager to housekeeping_cores: {}", bound.error().describe());
   }
   PLCHOST_TRY_ASSIGN(const auto rights, pool_rights(host));
-  clear_names(host.pool, rights);
+  const auto server = user_number(config_.dds.user);
+  clear_names(host.pool, rights, server_has_own_user() && server ? std::optional(*server) : std::nullopt);
+  share_with_server();
   if (auto ours = check_pool_owner(host.pool, rights); !ours) return ours;
   PLCHOST_TRY_ASSIGN(auto pool,
                      ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = rights}));
@@ -301,6 +326,8 @@ void Manager::tick() {
 }
 
 void Manager::look_after_pool() {
+  // An instance of a version before may have made a page anew.
+  if (server_has_own_user()) give_roots_files(config_.host.pool, ::getegid());
   if (page_->keep()) {
     spdlog::warn("host page of pool '{}': another program has written over it; it is written anew",
                  config_.host.pool);

@@ -55,6 +55,8 @@ class Manager : private InstanceObserver {
   [[nodiscard]] Result<void> set_up();
   [[nodiscard]] Result<void> lock_wishes();
   [[nodiscard]] Result<void> check_state_folders();
+  [[nodiscard]] bool server_has_own_user() const noexcept;
+  void share_with_server();
   void make_supervisor();
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
   void adopt_removed();

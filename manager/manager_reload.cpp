@@ -91,6 +91,7 @@ void Manager::take_over_host(const ManagerConfig& now, std::vector<std::string>&
   if (has_changed("[host] pool_")) use_pool_rights(lines);
   const bool served_anew =
       std::ranges::find(changes, TakesEffect::new_server, &KeyChange::when) != changes.end();
+  if (has_changed("[dds] ")) share_with_server();
   if (served_anew) api_server_.renew();
 }
 

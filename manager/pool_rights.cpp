@@ -55,8 +55,8 @@ Result<void> check_pool_owner(const std::string& pool, const MemoryRights& right
                   pool, owner, path));
 }
 
-void clear_names(const std::string& pool, const MemoryRights& rights) {
-  for (const ForeignFile& file : take_away_foreign_files(pool, rights)) {
+void clear_names(const std::string& pool, const MemoryRights& rights, std::optional<uid_t> api_server) {
+  for (const ForeignFile& file : take_away_foreign_files(pool, rights, api_server)) {
     if (file.taken_away) {
       spdlog::warn("{} was put there by another user ({}); it is removed and not used", file.path,
                    file.rights);

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <string>
+
+#include <sys/types.h>
 
 #include "manager/config/manager_config.hpp"
 #include "shm/base/result.hpp"
@@ -17,8 +20,8 @@ namespace plchost {
 [[nodiscard]] Result<MemoryRights> pool_rights(const HostConfig& host);
 
 /// Takes away what other users have put under the names of this pool, and logs whose it was, or why it
-/// cannot.
-void clear_names(const std::string& pool, const MemoryRights& rights);
+/// cannot. `api_server`: the user of the API server, if it has one of its own.
+void clear_names(const std::string& pool, const MemoryRights& rights, std::optional<uid_t> api_server);
 
 /// Gives a pool that is there the rights that the configuration says, and logs that. Objects that are in it
 /// already keep their rights; a process that has it mapped keeps it. refused, system: the pool keeps the

@@ -33,6 +33,15 @@ Result<UniqueFd> lock_folder(const std::string& folder) {
   return failure(ErrorCode::system, "cannot lock folder " + folder, errno);
 }
 
+// The next process that writes the log may have another user, which has the folder by its group.
+mode_t mode_of_files(int folder) {
+  constexpr mode_t kOwner = S_IRUSR | S_IWUSR;
+  constexpr mode_t kGroup = S_IRGRP | S_IWGRP;
+  struct stat status{};
+  const bool group_writes = ::fstat(folder, &status) == 0 && (status.st_mode & S_IWGRP) != 0;
+  return group_writes ? kOwner | kGroup : kOwner;
+}
+
 AuditRecord of_the_log(std::string what, std::string text) {
   AuditRecord record;
   record.time_unix_ns = unix_time_ns();
@@ -79,8 +88,12 @@ Result<void> AuditLog::go_on() {
 }
 
 Result<void> AuditLog::open_file(const std::string& path) {
-  UniqueFd fd(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR));
+  const mode_t mode = mode_of_files(lock_.get());
+  UniqueFd fd(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, mode));
+  const bool made = static_cast<bool>(fd);
+  if (!made) fd.reset(::open(path.c_str(), O_RDWR | O_APPEND | O_CLOEXEC | O_NOFOLLOW));
   if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
+  if (made) PLCHOST_TRY(check_errno(::fchmod(fd.get(), mode), "cannot set the rights of " + path));
   struct stat status{};
   PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
   bytes_ = static_cast<std::size_t>(status.st_size);

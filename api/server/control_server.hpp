@@ -32,6 +32,7 @@ struct ServerOptions {
   std::uint32_t application_limit_mib = 64;  ///< of a file that is sent
   std::uint16_t host_number = 0;             ///< for other hosts; 0: no gateway
   std::int64_t name_since_ns = 0;            ///< from when on this host has its name; 0: from now on
+  bool own_user = false;                     ///< another one than the manager's, which has the same group
   int beat_fd = -1;                          ///< an eventfd that the loop counts up while it runs; -1: none
   bool name_held = false;                    ///< a server before this one had the name: nobody is asked
   bool name_refused = false;  ///< a server before this one was refused the name: ask for longer

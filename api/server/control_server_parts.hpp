@@ -49,7 +49,8 @@ struct ControlServer::Parts {
         lister(pool),
         nodes(options.pool, options.blocks_base),
         epoch(started),
-        downloads(options.pool, std::uint64_t{options.application_limit_mib} << 20U),
+        downloads(options.pool, std::uint64_t{options.application_limit_mib} << 20U,
+                  options.own_user ? DownloadTable::kForGroup : DownloadTable::kForOwner),
         runs(options.host, started) {}
 
   Result<void> open();

@@ -5,6 +5,7 @@
 
 #include "api/control/exit_codes.hpp"
 #include "api/dds/cyclone_version.h"
+#include "api/server/access/own_user.hpp"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/heap_trim.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 // Above soft threads, far below every task.
 constexpr int kReceiveFifo = 20;
+constexpr int kMostFifo = kReceiveFifo + 1;  // of the loop that serves posts
 constexpr int kExitFailed = 1;
 constexpr int kExitUsage = 2;
 
@@ -32,6 +34,7 @@ int main(int argc, char** argv) {
   plchost::ServerOptions options;
   options.pool = "plchost";
   std::string log_level = "info";
+  std::string user;
   pid_t parent = 0;
   CLI::App app("plchost-dds: the API server of plchost, started by plchostd");
   app.set_version_flag("--version", PLCHOST_VERSION);
@@ -72,6 +75,8 @@ int main(int argc, char** argv) {
                  "where the manager keeps the applications that were sent");
   app.add_option("--application-limit", options.application_limit_mib, "the largest of them, MiB")
       ->check(CLI::Range(1U, 1024U));
+  app.add_option("--user", user,
+                 "run as this user, with no other rights than the API needs (default: that of the caller)");
   app.add_option("--parent", parent, "be killed when this process ends, which has started this one")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
@@ -81,9 +86,22 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
+  plchost::start_log("plchost-dds", log_level);
+  options.own_user = !user.empty();
+  if (options.own_user) {
+    const auto become =
+        plchost::become_user({.user = user,
+                              .most_fifo = kMostFifo,
+                              .files = plchost::files_of_server({.run = options.run_directory,
+                                                                 .audit = options.audit_folder,
+                                                                 .applications = options.applications_folder,
+                                                                 .identity = options.dds.identity})});
+    if (!become) return fail(plchost::failure_in("[dds] user", become.error()).error());
+    spdlog::info("runs as user {}, without capabilities; files: {}", user,
+                 become->empty() ? "those that it needs" : *become);
+  }
   // Also one that hangs or is stopped: two of one host would write over each other's status.
   if (parent != 0 && !plchost::end_with_parent(parent, SIGKILL)) return kExitFailed;
-  plchost::start_log("plchost-dds", log_level);
   (void)std::signal(SIGPIPE, SIG_IGN);
   if (const char* const why = plc_unknown_cyclone(); why != nullptr)
     spdlog::warn("{}: memory of clients that have ended is not given back", why);

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include <fmt/format.h>
+#include <linux/capability.h>
 #include <poll.h>
 #include <sys/signalfd.h>
 #include <sys/timerfd.h>
@@ -20,6 +21,7 @@
 #include "shm/base/unique_fd.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
+#include "shm/process/capabilities.hpp"
 #include "shm/process/end_with_parent.hpp"
 
 namespace plchost {
@@ -104,7 +106,15 @@ int refuse_start(const Options& options, const Error& error) {
   return kExitSetupFailed;
 }
 
+// As a service the manager has these for the API server. By hand a process keeps what it was given.
+Result<void> give_up_managers_rights() {
+  if (!never_gains_rights()) return {};
+  return give_up_capabilities({CAP_SETGID, CAP_SETUID});
+}
+
 int run(const Options& options) {
+  if (const auto given_up = give_up_managers_rights(); !given_up)
+    return refuse_start(options, given_up.error());
   if (!options.check_settings.empty()) return check_settings(options.check_settings);
   start_log("plc-instance/" + options.launch.name, options.launch.log_level);
   const auto signals = take_signals();

@@ -163,6 +163,13 @@ constexpr std::array kDdsKeys = {
          .meaning = "folder of this host's identity, see [Security](../api/security.md): DDS Security is on. "
                     "`--check-config` looks at all of it; when the manager runs, a bad one keeps the API "
                     "server from starting and no instance"}),
+    dds<&DdsConfig::user, TextKey<OwnUserRule>>(
+        {.name = "user",
+         .when = new_server,
+         .initial = "the user that starts the manager",
+         .meaning =
+             "user of the API server, see [Rights](install.md#rights). Another one needs a manager that "
+             "is root, and no `[blocks] host_number`; the manager's group is the server's, too"}),
     dds<&DdsConfig::allow_unsecured, TruthKey>(
         {.name = "allow_unsecured",
          .when = new_server,

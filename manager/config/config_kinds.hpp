@@ -145,6 +145,15 @@ struct UserRule {
   }
 };
 
+struct OwnUserRule {
+  static std::string form() { return "name or number in quotes, not root"; }
+  static std::string wrong(const ConfigReading& reading, const std::string& user) {
+    std::string text = UserRule::wrong(reading, user);
+    if (!text.empty() || user.empty() || user_number(user) != uid_t{0}) return text;
+    return "root has all rights; name another user, or leave the key out";
+  }
+};
+
 struct GroupRule {
   static std::string form() { return "name or number in quotes"; }
   static std::string wrong(const ConfigReading&, const std::string& group) {

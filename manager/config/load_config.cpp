@@ -130,6 +130,10 @@ void Loader::read_blocks(const TomlTable& table, unsigned line) {
   if (config.blocks.host_number != 0 && !config.dds.enabled) {
     reader.problem("host_number", "needs [dds] enabled = true: blocks go to other hosts over DDS");
   }
+  // Instances and firmware would have to trust the queues of that user.
+  if (config.blocks.host_number != 0 && !config.dds.user.empty()) {
+    reader.problem("host_number", "needs an API server with the manager's user: leave [dds] user out");
+  }
 }
 
 void Loader::read_instances(const TomlValue& value) {

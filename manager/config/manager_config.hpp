@@ -43,6 +43,7 @@ struct DdsConfig {
   std::vector<std::string> peers;  ///< addresses asked for other hosts where there is no multicast
   bool multicast = true;           ///< look for others by multicast, too; never on lo
   std::string identity;            ///< folder of the host's identity; empty: no security
+  std::string user;                ///< of the API server; empty: that of the manager
   bool allow_unsecured = false;    ///< without an identity: on another interface than lo all the same
 
   bool operator==(const DdsConfig&) const = default;

@@ -28,17 +28,32 @@ namespace plchost {
 
 namespace {
 
-constexpr mode_t kFileMode = 0600;
 constexpr std::string_view kUnfinished = ".part";
 
+// The API server reads descriptions, by the group where it has a user of its own. The folder of the host says
+// so.
+bool group_reads(const std::filesystem::path& folder) {
+  std::error_code error;
+  const auto rights = std::filesystem::status(folder, error).permissions();
+  return !error && (rights & std::filesystem::perms::group_read) != std::filesystem::perms::none;
+}
+
+mode_t file_mode(const StoreOrder& order) {
+  return group_reads(order.folder) ? 0640 : 0600;
+}
+
 Result<void> make_folder(const std::string& folder) {
+  using std::filesystem::perms;
   std::error_code error;
   const std::filesystem::path path(folder);
   if (std::filesystem::is_directory(path, error)) return {};
+  const bool is_first = !std::filesystem::is_directory(path.parent_path(), error);
+  const bool shared = !is_first && group_reads(path.parent_path());
   std::filesystem::create_directories(path, error);
   if (error) return failure(ErrorCode::system, "cannot create folder " + folder, error.value());
   for (const auto& made : {path, path.parent_path()}) {
-    std::filesystem::permissions(made, std::filesystem::perms::owner_all, error);
+    std::filesystem::permissions(
+        made, shared ? perms::owner_all | perms::group_read | perms::group_exec : perms::owner_all, error);
     if (error) return failure(ErrorCode::system, "cannot set the rights of " + made.string(), error.value());
     if (auto synced = sync_directory(made.parent_path()); !synced) return synced;
   }
@@ -97,7 +112,8 @@ Result<void> copy_file(const StoreOrder& order, const std::string& path) {
   struct stat status{};
   PLCHOST_TRY(check_errno(::fstat(from.get(), &status), "cannot examine " + order.source));
   if (!S_ISREG(status.st_mode)) return failure(ErrorCode::wrong_type, order.source + " is no plain file");
-  const UniqueFd to(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, kFileMode));
+  const UniqueFd to(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, file_mode(order)));
   if (!to) return failure(ErrorCode::system, "cannot open " + path, errno);
   if (auto copied = copy_checked(order, from.get(), to.get(), path); !copied) return copied;
   const auto synced = check_errno(::fsync(to.get()), "cannot sync " + path);
@@ -145,7 +161,7 @@ Result<void> describe_version(const StoreOrder& order, const std::string& path) 
                                    .by = order.by,
                                    .from = order.from,
                                    .before = order.before};
-  if (auto written = replace_file(description_path(path), encode(version), kFileMode); !written)
+  if (auto written = replace_file(description_path(path), encode(version), file_mode(order)); !written)
     return written;
   return sync_directory(order.folder);
 }
@@ -203,7 +219,7 @@ Result<std::string> set_boot(const StoreOrder& order) {
     std::error_code error;
     std::filesystem::remove(boot_path(order.folder), error);
     if (error) return failure(ErrorCode::system, "cannot remove " + boot_path(order.folder), error.value());
-  } else if (auto written = replace_file(boot_path(order.folder), order.boot, kFileMode); !written) {
+  } else if (auto written = replace_file(boot_path(order.folder), order.boot, file_mode(order)); !written) {
     return std::unexpected(written.error());
   }
   PLCHOST_TRY(sync_directory(order.folder));

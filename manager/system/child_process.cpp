@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -152,6 +153,20 @@ Result<void> signal_process(const ChildProcess& process, int signal) {
   if (sent != 0 && errno == ESRCH) return {};
   PLCHOST_TRY(check_errno(sent, fmt::format("cannot signal {} to process {}", signal, process.pid)));
   return {};
+}
+
+// The system calls and not the functions: those would change all threads.
+Result<void> signal_process_of(uid_t user, const ChildProcess& process, int signal) {
+  auto sent = signal_process(process, signal);
+  if (sent || sent.error().system_errno != EPERM) return sent;
+  constexpr auto kSame = static_cast<uid_t>(-1);
+  const uid_t own = ::geteuid();
+  const int dumpable = ::prctl(PR_GET_DUMPABLE, 0, 0, 0, 0);
+  if (::syscall(SYS_setresuid, kSame, user, kSame) != 0) return sent;
+  sent = signal_process(process, signal);
+  PLCHOST_TRY(check_errno(::syscall(SYS_setresuid, kSame, own, kSame), "cannot be the own user again"));
+  if (dumpable == 1) (void)::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0);  // each change of the user clears it
+  return sent;
 }
 
 Result<ReportChannel> make_report_channel() {

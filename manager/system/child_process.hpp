@@ -58,6 +58,9 @@ void end_session(const ChildProcess& leader) noexcept;
 /// A process that is gone already is no error.
 [[nodiscard]] Result<void> signal_process(const ChildProcess& process, int signal);
 
+/// The same of a process that has become another user's. For that root needs no CAP_KILL, only CAP_SETUID.
+[[nodiscard]] Result<void> signal_process_of(uid_t user, const ChildProcess& process, int signal);
+
 /// SIGKILL, waits for the end, and reaps it: of a child that cannot be supervised.
 void kill_and_reap(const ChildProcess& process) noexcept;
 

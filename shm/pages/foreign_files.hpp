@@ -1,8 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <sys/types.h>
 
 #include "shm/base/result.hpp"
 #include "shm/files/memory_rights.hpp"
@@ -18,9 +21,14 @@ struct ForeignFile {
 
 /// Takes away files that have the names of the pool, of its pages and of its memories and do not belong
 /// there. Those are files of a user who is not trusted, folders, FIFOs, links. `rights`: those of the pool; a
-/// memory that is none of the runtime's own may belong to any user who may write the pool. For the manager,
-/// before it makes or opens any of them. Set-up.
-[[nodiscard]] std::vector<ForeignFile> take_away_foreign_files(std::string_view pool,
-                                                               const MemoryRights& rights);
+/// memory that is none of the runtime's own may belong to any user who may write the pool. `api_server`: the
+/// user of the API server, which owns the ledger of posts and downloads; nothing: that of the manager. For
+/// the manager, before it makes or opens any of them. Set-up.
+[[nodiscard]] std::vector<ForeignFile> take_away_foreign_files(
+    std::string_view pool, const MemoryRights& rights, std::optional<uid_t> api_server = std::nullopt);
+
+/// Gives the pool's files that belong to this user and to root's group to `group`. A manager before this one
+/// had root's group, and its processes have made them. Set-up.
+void give_roots_files(std::string_view pool, gid_t group) noexcept;
 
 }  // namespace plchost

@@ -140,6 +140,8 @@ on_machine sh -c 'apt-get -q install -y --no-install-recommends /packages/*.deb'
 sees_host() { [ "$(plcctl list hosts --json | jq -r ".[].host")" = plchost ]; }
 until_true 60 sees_host
 [ "$(on_machine systemctl is-active plchostd)" = active ] || fail "the service does not run"
+[ "$(on_machine systemctl show -p Type -p WatchdogUSec -p NotifyAccess plchostd | paste -sd' ')" = "Type=notify NotifyAccess=main WatchdogUSec=15s" ] ||
+  fail "$(on_machine systemctl show -p Type -p WatchdogUSec -p NotifyAccess plchostd)"
 [ "$(on_machine python3 -c 'import plchost_client; print(plchost_client.Client(timeout=10).hosts()[0].name)')" = plchost ] || fail "Python sees no host"
 
 story "two instances come by a reload of the service"
@@ -148,18 +150,41 @@ until_true 60 plcctl start instance line1 line2
 run || fail "they do not run"
 shown=$(instances)
 
+story "each process has its rights, and nobody else has any"
+# of PROGRAM FIELD: of /proc/PID/status
+of() { on_machine sh -c 'sed -n "s/^$2:[[:space:]]*//p" "/proc/$(pgrep -o -x "$1")/status"' _ "$1" "$2" | tr -s '\t ' ' '; }
+server=$(on_machine id -u plchost-dds)
+group=$(on_machine getent group plchost | cut -d: -f3)
+[ "$(of plchost-dds Uid)" = "$server $server $server $server" ] || fail "the API server has the user $(of plchost-dds Uid)"
+[ "$(of plchost-dds Gid)" = "$group $group $group $group" ] || fail "the API server has the group $(of plchost-dds Gid)"
+[ "$(of plchost-dds CapPrm)" = 0000000000000000 ] || fail "the API server has capabilities: $(of plchost-dds CapPrm)"
+[ "$(of plc-instance CapPrm)" = 0000000000804000 ] || fail "an instance has the capabilities $(of plc-instance CapPrm)"
+[ "$(of plc-instance NoNewPrivs)$(of plchost-dds NoNewPrivs)" = 11 ] || fail "they may gain rights"
+on_machine journalctl -q --no-pager -u plchostd | grep -q 'files: those that it needs' || fail "the API server sees all files"
+exposure=$(on_machine systemd-analyze security --no-pager plchostd.service | sed -n 's/.*level for plchostd.service: \([0-9.]*\) .*/\1/p')
+[ "$(jq -n "$exposure < 3")" = true ] || fail "systemd-analyze security: $exposure"
+for file in /run/plchost/manager.sock /run/plchost/line1.sock /dev/shm/plchost /dev/shm/plchost.instance.line1; do
+  ! on_machine setpriv --reuid 65534 --regid 65534 --clear-groups test -r "$file" || fail "everybody can read $file"
+  ! on_machine setpriv --reuid 65534 --regid 65534 --clear-groups test -w "$file" || fail "everybody can write $file"
+done
+
 story "a restart of the service, an upgrade, a kill and a stop of the manager's process end none of them"
 ends_no_plc "systemctl restart" on_machine systemctl restart plchostd
 ends_no_plc "an upgrade" on_machine sh -c 'apt-get -q install -y --reinstall /packages/*.deb'
 ends_no_plc "a kill of the manager" on_machine systemctl kill --kill-who=main -s KILL plchostd
 ends_no_plc "a manager that stands still" on_machine systemctl kill --kill-who=main -s STOP plchostd
 
-story "a stop ends them in order, and a start brings them back"
+story "a stop ends them in order"
 on_machine systemctl stop plchostd
 [ "$(on_machine pgrep -c plc-instance)" = 0 ] || fail "instances run on after a stop"
 [ -z "$(on_machine ls /dev/shm)" ] || fail "left in /dev/shm: $(on_machine ls /dev/shm)"
+
+story "files of another user under its names are taken away and told, and it starts"
+on_machine setpriv --reuid 65534 --regid 65534 --clear-groups sh -c 'umask 0; for name in host posts instance.line1; do echo planted >"/dev/shm/plchost.$name"; done'
 on_machine systemctl start plchostd
 until_true 60 run
+[ "$(on_machine journalctl -q --no-pager -u plchostd | grep -c 'was put there by another user (owner 65534')" = 3 ] || fail "the planted files are not told"
+[ -z "$(on_machine find /dev/shm -user 65534)" ] || fail "planted files are left: $(on_machine find /dev/shm -user 65534)"
 
 story "a removal keeps the state, and a purge leaves nothing"
 on_machine apt-get -q remove -y plchost >"$log" 2>&1 || fail "the removal"

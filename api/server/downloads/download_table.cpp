@@ -15,7 +15,8 @@
 
 namespace plchost {
 
-DownloadTable::DownloadTable(std::string pool, std::uint64_t limit) : pool_(std::move(pool)), limit_(limit) {
+DownloadTable::DownloadTable(std::string pool, std::uint64_t limit, mode_t mode)
+    : pool_(std::move(pool)), limit_(limit), mode_(mode) {
   remove_downloads(pool_);
 }
 
@@ -52,12 +53,11 @@ Result<void> DownloadTable::check_room(const std::string& instance, std::uint64_
 
 // Any user can put files there: their names are passed over.
 Result<void> DownloadTable::make_file(Download& download) {
-  constexpr mode_t kOwnerOnly = 0600;
   constexpr int kMostNames = 100'000;
   for (int i = 0; i < kMostNames; ++i) {
     download.path = download_file_name(pool_, ++last_file_);
     download.file.reset(
-        ::open(download.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kOwnerOnly));
+        ::open(download.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode_));
     if (download.file) return {};
     if (errno != EEXIST) break;
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <control.h>
+#include <sys/types.h>
 
 #include "api/dds/guid.hpp"
 #include "shm/base/result.hpp"
@@ -50,8 +51,12 @@ class DownloadTable {
   /// A download of which nothing comes for so long is given up.
   static constexpr Duration kPatience = std::chrono::seconds(10);
 
+  /// Rights to the files: the manager reads them as their owner, or by its group.
+  static constexpr mode_t kForOwner = 0600;
+  static constexpr mode_t kForGroup = 0640;
+
   /// `limit`: the largest file, bytes; together twice as much. Removes what an earlier process has left.
-  DownloadTable(std::string pool, std::uint64_t limit);
+  DownloadTable(std::string pool, std::uint64_t limit, mode_t mode = kForOwner);
   DownloadTable(const DownloadTable&) = delete;
   DownloadTable& operator=(const DownloadTable&) = delete;
   ~DownloadTable();
@@ -99,6 +104,7 @@ class DownloadTable {
 
   std::string pool_;
   std::uint64_t limit_;
+  mode_t mode_;
   std::uint64_t last_file_ = 0;
   std::list<Download> downloads_;
 };

@@ -70,6 +70,7 @@ TEST_F(ReloadOfTheHost, StartsTheApiServerAnewForItsKeysAndNothingElse) {
       {"[dds] peers", {"[dds]\n", "[dds]\npeers = [\"127.0.0.9\"]\n"}, "--peer 127.0.0.9"},
       {"[dds] multicast", {"[dds]\n", "[dds]\nmulticast = false\n"}, "--no-multicast"},
       {"[dds] allow_unsecured", {"[dds]\n", "[dds]\nallow_unsecured = true\n"}, "--allow-unsecured"},
+      {"[dds] user", {"[dds]\n", "[dds]\nuser = \"65534\"\n"}, "--user 65534"},
       {"[blocks] host_number", {"[dds]\n", "[blocks]\nhost_number = 7\n[dds]\n"}, "--host-number 7"},
       {"[blocks] base", {"[dds]\n", "[blocks]\nbase = \"belt\"\n[dds]\n"}, "--blocks-base belt"},
   };

@@ -86,6 +86,21 @@ TEST_F(AuditLogTest, KeepsWhoDidWhatFromWhereAndWhatCameOfIt) {
   EXPECT_EQ(record["result"], "ok");
 }
 
+// Its next writer may be another user of that group.
+TEST_F(AuditLogTest, IsForTheGroupWhereTheFolderIs) {
+  namespace fs = std::filesystem;
+  const auto rights = [&](std::uint64_t first) {
+    return fs::status(folder + "/" + audit_file_name(first)).permissions() & fs::perms::mask;
+  };
+  auto log = open(1);
+  ASSERT_TRUE(log->append(stop_of("line1")));
+  EXPECT_EQ(rights(1), fs::perms::owner_read | fs::perms::owner_write);
+  fs::permissions(folder, fs::perms::owner_all | fs::perms::group_all);
+  ASSERT_TRUE(log->append(stop_of("line1")));
+  EXPECT_EQ(rights(log->head().number),
+            fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read | fs::perms::group_write);
+}
+
 TEST_F(AuditLogTest, IsOneChainOverSeveralLivesOfItsWriter) {
   for (int life = 0; life < 3; ++life) fill(5);
   const AuditFindings found = check();

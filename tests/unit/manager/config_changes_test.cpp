@@ -90,6 +90,7 @@ constexpr std::array kTwoValues = {
     TwoValues{"[dds]", "peers", "[]", R"(["10.0.0.1"])"},
     TwoValues{"[dds]", "multicast", "true", "false"},
     TwoValues{"[dds]", "identity", R"("/a")", R"("/b")"},
+    TwoValues{"[dds]", "user", R"("1")", R"("65534")"},
     TwoValues{"[dds]", "allow_unsecured", "true", "false"},
     TwoValues{"[blocks]", "host_number", "1", "2"},
     TwoValues{"[blocks]", "base", R"("blocks")", R"("other")"},

@@ -210,9 +210,16 @@ INSTANTIATE_TEST_SUITE_P(
                     "660 is a whole number; allowed is a text"},
         WrongConfig{"keep", "[host]\nkeep_pool = 1\n", "2", "1 is a whole number; allowed is true or false"},
         WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
-        WrongConfig{"dds_key", "[dds]\nport = 1\n", "2",
-                    "[dds] unknown key 'port'; allowed are enabled, interface, peers, multicast, identity, "
-                    "allow_unsecured"},
+        WrongConfig{
+            "dds_key", "[dds]\nport = 1\n", "2",
+            "[dds] unknown key 'port'; allowed are enabled, interface, peers, multicast, identity, user, "
+            "allow_unsecured"},
+        WrongConfig{"user_unknown", "[dds]\nuser = \"nobody here\"\n", "2",
+                    "there is no user \"nobody here\""},
+        WrongConfig{"user_root", "[dds]\nuser = \"root\"\n", "2", "root has all rights; name another user"},
+        WrongConfig{"user_number", "[dds]\nuser = \"0\"\n", "2", "root has all rights; name another user"},
+        WrongConfig{"user_of_gateway", "[blocks]\nhost_number = 1\n[dds]\nuser = \"nobody\"\n", "2",
+                    "host_number: needs an API server with the manager's user"},
         WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},
         WrongConfig{"open_to_network", "[dds]\ninterface = \"eth0\"\n", "2",
                     "interface: \"eth0\" without an identity opens this controller to all who reach it"},

@@ -99,6 +99,25 @@ TEST_F(StoreApplication, PutsTheFileInPlaceWithAllThatIsKnownOfIt) {
   EXPECT_EQ(perms & std::filesystem::perms::others_all, std::filesystem::perms::none);
 }
 
+// The API server reads descriptions, and may have another user.
+TEST_F(StoreApplication, HasTheRightsOfTheGroupThatReadsTheFolderOfTheHost) {
+  namespace fs = std::filesystem;
+  const auto rights = [&](const fs::path& path) {
+    return fs::status(path).permissions() & fs::perms::group_all;
+  };
+  const std::string own = keep("own");
+  EXPECT_EQ(rights(own), fs::perms::none);
+  EXPECT_EQ(rights(root_ / "applications.cell"), fs::perms::none);
+  fs::permissions(root_ / "applications.cell",
+                  fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec);
+  order_.folder = root_ / "applications.cell" / "line2";
+  order_.earlier.clear();
+  const std::string shared = keep("shared");
+  EXPECT_EQ(rights(description_path(shared)), fs::perms::group_read);
+  EXPECT_EQ(rights(order_.folder), fs::perms::group_read | fs::perms::group_exec);
+  EXPECT_EQ(rights(root_ / "applications.cell"), fs::perms::group_read | fs::perms::group_exec);
+}
+
 // The second one has not come up, and the third one may not either.
 TEST_F(StoreApplication, KeepsWhatTheInstanceMayGoBackTo) {
   order_.keep = 1;

@@ -148,6 +148,33 @@ TEST_F(ForeignFiles, OfThoseWhoMayWriteThePoolStayButNotAsRetainVariables) {
   EXPECT_THAT(take_away(), SizeIs(1));
 }
 
+TEST_F(ForeignFiles, OfAnApiServerOfThatUserAreItsOwn) {
+  plant_file(pool_.get() + ".posts");
+  plant_file(pool_.get() + ".download.1");
+  plant_file(host_page_name(pool_.get()));
+  EXPECT_THAT(take_away_foreign_files(pool_.get(), {.mode = 0660}, kStranger), SizeIs(1));
+  EXPECT_FALSE(exists(host_page_name(pool_.get())));
+  EXPECT_TRUE(exists(pool_.get() + ".posts"));
+  EXPECT_THAT(take_away(), SizeIs(2)) << "it has the manager's user";
+}
+
+TEST_F(ForeignFiles, OfRootsGroupAreGivenToTheManagers) {
+  ASSERT_TRUE(HostPageWriter::create(pool_.get()));
+  plant_file(pool_.get() + ".posts");
+  const std::string neighbour = pool_.get() + "2.host";
+  std::ofstream(MemoryFile::path(neighbour)) << "page";
+  const auto group = [](const std::string& file) {
+    struct stat status{};
+    EXPECT_EQ(::stat(MemoryFile::path(file).c_str(), &status), 0);
+    return status.st_gid;
+  };
+  constexpr gid_t kManagers = 64041;
+  give_roots_files(pool_.get(), kManagers);
+  EXPECT_EQ(group(host_page_name(pool_.get())), kManagers);
+  EXPECT_EQ(group(pool_.get() + ".posts"), kStranger);
+  EXPECT_EQ(group(neighbour), 0U);
+}
+
 TEST_F(ForeignFiles, APoolOfAnotherUserIsNotGoneOnWith) {
   ASSERT_TRUE(ObjectPool::create(pool_.get(), {.max_objects = 16}));
   give_away(pool_.get());

@@ -1,0 +1,78 @@
+#include "manager/server_files.hpp"
+
+#include <cerrno>
+#include <filesystem>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/files/memory_rights.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr int kFolderFlags = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
+constexpr int kFileFlags = O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
+
+struct EndFolder {
+  void operator()(DIR* folder) const noexcept { ::closedir(folder); }
+};
+
+mode_t mode_of(bool folder, GroupRight right) noexcept {
+  if (folder) return right == GroupRight::writes ? 0770 : 0750;
+  return right == GroupRight::writes ? 0660 : 0640;
+}
+
+// One that has another name as well may be anything of this user.
+bool is_own(const struct stat& status) noexcept {
+  const bool single = S_ISDIR(status.st_mode) || (S_ISREG(status.st_mode) && status.st_nlink == 1);
+  return single && status.st_uid == ::geteuid();
+}
+
+Result<void> share(int folder, const std::string& path, GroupRight right, int depth);
+
+Result<void> share_entry(int folder, const char* name, const std::string& path, GroupRight right, int depth) {
+  const UniqueFd fd(::openat(folder, name, kFileFlags));
+  struct stat status{};
+  if (!fd || ::fstat(fd.get(), &status) != 0 || !is_own(status)) return {};
+  if (S_ISDIR(status.st_mode)) return share(fd.get(), path, right, depth);
+  return give_rights(fd.get(), {.group = ::getegid(), .mode = mode_of(false, right)}, path);
+}
+
+Result<void> share(int folder, const std::string& path, GroupRight right, int depth) {
+  constexpr int kDeepest = 3;
+  PLCHOST_TRY(give_rights(folder, {.group = ::getegid(), .mode = mode_of(true, right)}, path));
+  if (depth == kDeepest) return {};
+  const std::unique_ptr<DIR, EndFolder> entries(::fdopendir(::openat(folder, ".", kFolderFlags)));
+  if (entries == nullptr) return failure(ErrorCode::system, "cannot read folder " + path, errno);
+  while (const dirent* const entry = ::readdir(entries.get())) {  // NOLINT(concurrency-mt-unsafe)
+    const std::string_view name = static_cast<const char*>(entry->d_name);
+    if (name == "." || name == "..") continue;
+    PLCHOST_TRY(share_entry(folder, entry->d_name, fmt::format("{}/{}", path, name), right, depth + 1));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> share_folder(const std::string& path, GroupRight right) {
+  std::error_code error;
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
+  if (error) return failure(ErrorCode::system, "cannot make the folder of " + path, error.value());
+  if (::mkdir(path.c_str(), S_IRWXU) != 0 && errno != EEXIST)
+    return failure(ErrorCode::system, "cannot create folder " + path, errno);
+  const UniqueFd fd(::open(path.c_str(), kFolderFlags));
+  if (!fd) return failure(ErrorCode::system, "cannot open folder " + path, errno);
+  return share(fd.get(), path, right, 0);
+}
+
+}  // namespace plchost

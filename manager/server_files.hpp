@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The right of the manager's group to a folder of the state directory.
+enum class GroupRight : bool { reads, writes };
+
+/// Gives a folder, and what is in it, to the group of this process: that is how an API server with a user of
+/// its own reads or writes it. Makes the folder if it is not there. Files of other users stay as they are,
+/// and links are not followed: those who write there have fewer rights than this process. Not for others to
+/// read.
+[[nodiscard]] Result<void> share_folder(const std::string& path, GroupRight right);
+
+}  // namespace plchost

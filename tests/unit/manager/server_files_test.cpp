@@ -1,0 +1,81 @@
+// Folders that the manager gives to the group of an API server with a user of its own.
+#include "manager/server_files.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "tests/support/own_name.hpp"
+
+namespace plchost {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ServerFiles : public testing::Test {
+ protected:
+  ServerFiles() : root_(own_path("server-files")), folder_(root_ / "state" / "audit.cell") {
+    fs::create_directories(root_);
+  }
+  ~ServerFiles() override { fs::remove_all(root_); }
+  static std::string mode(const fs::path& path) {
+    return fmt::format("{:04o}", static_cast<unsigned>(fs::symlink_status(path).permissions()));
+  }
+  static void write(const fs::path& path, fs::perms rights = fs::perms::owner_read) {
+    std::ofstream(path) << "text";
+    fs::permissions(path, rights);
+  }
+  fs::path root_;
+  fs::path folder_;
+};
+
+TEST_F(ServerFiles, AreMadeWithTheFoldersAbove) {
+  ASSERT_TRUE(share_folder(folder_, GroupRight::writes));
+  EXPECT_EQ(mode(folder_), "0770");
+  ASSERT_TRUE(share_folder(root_ / "state" / "applications.cell", GroupRight::reads));
+  EXPECT_EQ(mode(root_ / "state" / "applications.cell"), "0750");
+}
+
+TEST_F(ServerFiles, OfAVersionBeforeAreGivenToTheGroup) {
+  fs::create_directories(folder_ / "line1");
+  fs::permissions(folder_, fs::perms::owner_all);
+  write(folder_ / "line1" / "000001.json");
+  ASSERT_TRUE(share_folder(folder_, GroupRight::reads));
+  EXPECT_EQ(mode(folder_ / "line1"), "0750");
+  EXPECT_EQ(mode(folder_ / "line1" / "000001.json"), "0640");
+  ASSERT_TRUE(share_folder(folder_, GroupRight::writes));
+  EXPECT_EQ(mode(folder_ / "line1" / "000001.json"), "0660");
+}
+
+// The server writes there, and the manager is root.
+TEST_F(ServerFiles, AreNoneThatALinkLeadsTo) {
+  fs::create_directories(folder_);
+  fs::create_directories(root_ / "other");
+  write(root_ / "other" / "secret");
+  fs::permissions(root_ / "other", fs::perms::owner_all);
+  fs::create_symlink(root_ / "other" / "secret", folder_ / "link");
+  fs::create_symlink(root_ / "other", folder_ / "refused");
+  fs::create_hard_link(root_ / "other" / "secret", folder_ / "name");
+  ASSERT_TRUE(share_folder(folder_, GroupRight::writes));
+  EXPECT_EQ(mode(root_ / "other" / "secret"), "0400");
+  EXPECT_EQ(mode(root_ / "other"), "0700");
+  EXPECT_FALSE(share_folder(folder_ / "refused", GroupRight::writes));
+  EXPECT_EQ(mode(root_ / "other"), "0700");
+}
+
+TEST_F(ServerFiles, OfOtherUsersStayAsTheyAre) {
+  if (::geteuid() != 0) GTEST_SKIP() << "to give files to another user needs root";
+  fs::create_directories(folder_);
+  write(folder_ / "theirs");
+  ASSERT_EQ(::chown((folder_ / "theirs").c_str(), 65534, 65534), 0);
+  ASSERT_TRUE(share_folder(folder_, GroupRight::writes));
+  EXPECT_EQ(mode(folder_ / "theirs"), "0400");
+}
+
+}  // namespace
+}  // namespace plchost
