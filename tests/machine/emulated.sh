@@ -27,7 +27,7 @@ works_with() {
 
 machine_start() {
   local accelerator=tcg,thread=multi
-  if [ -w /dev/kvm ] && works_with kvm; then
+  if [ -w /dev/kvm ] && works_with kvm 2>/dev/null; then
     accelerator=kvm
     machine_is_emulated=no
   fi
