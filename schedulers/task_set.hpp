@@ -153,9 +153,10 @@ class TaskSet {
   /// deadline. While the tasks are stopped.
   std::vector<std::string_view> still_busy(TimePoint deadline) { return wait_until_settled(deadline); }
   /// Lets each cyclic and freewheeling task run one cycle, one after the other by priority, whatever the
-  /// scheduler. When single_cycle_done(), or at any time before, it is ended by a stop. wrong_state: as
-  /// start().
-  [[nodiscard]] Result<void> begin_single_cycle(const SchedulerSettings& settings);
+  /// scheduler. When single_cycle_done(), or at any time before, it is ended by a stop. `before`: called when
+  /// it is certain that they will run, and none does yet. wrong_state: as start().
+  [[nodiscard]] Result<void> begin_single_cycle(const SchedulerSettings& settings,
+                                                const std::function<void()>& before = {});
   /// Each has come back from its cycle, or never will.
   [[nodiscard]] bool single_cycle_done() noexcept;
   /// "Main, Report"

@@ -150,8 +150,10 @@ std::string TaskSet::names_of(const std::vector<std::size_t>& tasks) const {
   return join_names(names);
 }
 
-Result<void> TaskSet::begin_single_cycle(const SchedulerSettings& settings) {
-  if (auto startable = check_startable(); !startable) return startable;
+Result<void> TaskSet::begin_single_cycle(const SchedulerSettings& settings,
+                                         const std::function<void()>& before) {
+  PLCHOST_TRY(check_startable());
+  if (before) before();
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < tasks_.size(); ++i) {
     if (tasks_[i]->kind().timed) order.push_back(i);

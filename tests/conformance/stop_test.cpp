@@ -374,6 +374,22 @@ TEST_F(SingleCycleOfTasks, ComesBetweenTwoRunsUnderEachScheduler) {
   }
 }
 
+TEST_F(SingleCycleOfTasks, TellsThatItWillRunBeforeTheFirstCycleAndOnlyThen) {
+  using T = Tasks<LinuxClock>;
+  add(T::cyclic("Fast", milliseconds(1), {}), 1);
+  ASSERT_TRUE(tasks_.create());
+  int told = 0;
+  const auto before = [&] {
+    ++told;
+    EXPECT_EQ(tasks_.counters(0).cycles, 0U);
+  };
+  ASSERT_TRUE(tasks_.set->begin_single_cycle({}, before));
+  EXPECT_EQ(told, 1);
+  EXPECT_EQ(tasks_.set->begin_single_cycle({}, before).error().code, ErrorCode::wrong_state);
+  EXPECT_EQ(told, 1) << "it was refused";
+  ASSERT_TRUE(tasks_.set->stop(seconds(100)));
+}
+
 TEST_F(SingleCycleOfTasks, WithoutSuchATaskIsDoneAtOnce) {
   add(Tasks<LinuxClock>::external("Work", "work", {}), 0);
   ASSERT_TRUE(tasks_.create());

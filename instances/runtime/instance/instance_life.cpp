@@ -74,12 +74,11 @@ void Instance::begin_stop(std::string_view why) {
 }
 
 Result<std::string> Instance::begin_single_cycle() {
-  begin_debugging();
-  host_->areas().outputs().arm();
-  if (auto begun = tasks_->begin_single_cycle(start_.settings.scheduler); !begun) {
-    host_->areas().outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
-    return std::unexpected(std::move(begun).error());
-  }
+  // A cycle that cannot begin changes neither outputs nor breakpoints.
+  PLCHOST_TRY(tasks_->begin_single_cycle(start_.settings.scheduler, [this] {
+    host_->areas().outputs().arm();
+    begin_debugging();  // the first cycle can halt
+  }));
   single_cycle_ends_ = MonotonicClock::now() + start_.settings.stop.others;
   life_.go_to(ApplicationState::single_cycle, "single cycle");
   return {};
