@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <functional>
 #include <string>
@@ -10,18 +11,21 @@
 
 namespace plchost {
 
+/// The words for BuildOrder::compiler.
+inline constexpr std::array kCompilers{"matiec", "strucpp"};
+
 /// The order to `plcctl build application`.
 struct BuildOrder {
   std::vector<std::string> sources;  ///< files (ST, or PLCopen XML), and folders whose *.st are meant
   std::string tasks = {};            ///< task file; empty: X.toml beside a single source X.st, if it is there
   std::string output;  ///< the application: line.so. Of several resources each has its name in it
   std::string compiler =
-      {};              ///< matiec or strucpp; empty: the one of which the folder is named, or that is there
-  std::string matiec;  ///< folder of that compiler; empty: PLCHOST_MATIEC, PATH
-  std::string strucpp = {};   ///< folder of that compiler; empty: PLCHOST_STRUCPP, PATH
-  std::string adapters;       ///< folder of plc_app.h and of the adapters' files
-  bool debug = false;         ///< tasks can halt at each statement: see plc_debug.h
-  std::string keep;           ///< folder in which the files between are left (see WorkFolder); empty: nowhere
+      {};                    ///< of kCompilers; empty: the one of which the folder is named, or that is there
+  std::string matiec;        ///< folder of that compiler; empty: PLCHOST_MATIEC, PATH
+  std::string strucpp = {};  ///< folder of that compiler; empty: PLCHOST_STRUCPP, PATH
+  std::string adapters;      ///< folder of plc_app.h and of the adapters' files
+  bool debug = false;        ///< tasks can halt at each statement: see plc_debug.h
+  std::string keep;          ///< folder in which the files between are left (see WorkFolder); empty: nowhere
   std::string check_program;  ///< plc-instance; empty: the application is not checked
   Duration translate_limit = std::chrono::seconds(120);  ///< of iec2c or STruC++, and of the check
   Duration compile_limit = std::chrono::seconds(600);    ///< of the C and C++ compilers

@@ -26,6 +26,17 @@ std::string name_beside(const std::string& path, int attempt) {
   return file.parent_path() / fmt::format(".{}.{}-{}", file.filename().string(), ::getpid(), attempt);
 }
 
+/// Writes a new file beside `path`; tells its name.
+Result<std::string> write_beside(const std::string& path, std::string_view text) {
+  for (int attempt = 0;; ++attempt) {
+    std::string fresh = name_beside(path, attempt);
+    const auto written = write_new_file(fresh, text);
+    if (written) return fresh;
+    if (written.error().code != ErrorCode::already_exists || attempt == kAttempts)
+      return std::unexpected(written.error());
+  }
+}
+
 /// A second name of the file, or a copy where the file system has no links. Empty: there is no such file.
 Result<std::string> put_aside(const std::string& path) {
   for (int attempt = 0;; ++attempt) {
@@ -52,6 +63,13 @@ std::string why_no_output(const std::string& path) {
     return fmt::format("{} is a folder; name a file in it", path);
   if (fs::exists(status) && !fs::is_regular_file(status))
     return fmt::format("{} is not a plain file; name another one", path);
+  // Rights do not tell it of each file system, nor to each user.
+  const auto fresh = write_beside(path, "");
+  if (!fresh) {
+    return fmt::format("{}: no file can be made in the folder {}: {}; name another one", path,
+                       folder.string(), std::generic_category().message(fresh.error().system_errno));
+  }
+  ::unlink(fresh->c_str());
   return "";
 }
 
@@ -59,13 +77,8 @@ Result<OutputFile> OutputFile::make(const std::string& from, const std::string& 
   if (std::string why = why_no_output(to); !why.empty())
     return failure(ErrorCode::wrong_type, std::move(why));
   PLCHOST_TRY_ASSIGN(const TextFile made, read_text_file(from, kMaxApplication));
-  for (int attempt = 0;; ++attempt) {
-    const std::string fresh = name_beside(to, attempt);
-    const auto written = write_new_file(fresh, made.text);
-    if (written) return OutputFile(to, fresh);
-    if (written.error().code != ErrorCode::already_exists || attempt == kAttempts)
-      return std::unexpected(written.error());
-  }
+  PLCHOST_TRY_ASSIGN(auto fresh, write_beside(to, made.text));
+  return OutputFile(to, std::move(fresh));
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept

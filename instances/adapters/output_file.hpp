@@ -33,7 +33,7 @@ class OutputFile {
   std::string old_;    ///< name of the old version after that; empty: there was none
 };
 
-/// Why `path` can be no output; empty: it can.
+/// Why `path` can be no output; empty: it can. Makes and removes a file beside it.
 [[nodiscard]] std::string why_no_output(const std::string& path);
 
 }  // namespace plchost

@@ -2,8 +2,6 @@
 
 #include <string_view>
 
-#include <fmt/format.h>
-
 #include "instances/adapters/iec/environment.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/strucpp/compiler.hpp"
@@ -17,10 +15,6 @@ std::unique_ptr<Translator> choose_translator(BuildContext& context) {
   };
   if (named("matiec", order.matiec, order.strucpp)) return make_matiec_translator(context);
   if (named("strucpp", order.strucpp, order.matiec)) return make_strucpp_translator(context);
-  if (!order.compiler.empty()) {
-    context.fail(fmt::format("--compiler {}: allowed are matiec and strucpp", order.compiler));
-    return nullptr;
-  }
   const auto matiec = matiec::find_compiler(order.matiec);
   const auto strucpp = strucpp::find_compiler(order.strucpp);
   // A folder that is named, and is none of a compiler, is an error also if the other one is found.

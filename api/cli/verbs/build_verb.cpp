@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <ranges>
 #include <string>
@@ -60,9 +61,9 @@ void add_build_verb(const Command& plcctl, CliSession& session) {
           "external events, watchdogs and other options of the tasks, as TOML (else X.toml beside a single "
           "X.st or X.xml)",
           "")
-      .option("--compiler", order->compiler,
-              "matiec or strucpp (else the one of which the folder is named, or that is found, first MATIEC)",
-              "")
+      .word("--compiler", order->compiler,
+            "matiec or strucpp (else the one of which the folder is named, or that is found, first MATIEC)",
+            {std::begin(kCompilers), std::end(kCompilers)})
       .option("--matiec", order->matiec,
               "folder of the compiler iec2c with its lib (else by PLCHOST_MATIEC, else in PATH)", "")
       .option("--strucpp", order->strucpp,

@@ -405,12 +405,15 @@ TEST_F(StructuredText, IsTranslatedByTheCompilerThatIsNamed) {
   const auto said = [&](std::vector<std::string> options) {
     std::vector<std::string> command{PLCCTL, "build", "application", source, "-o", so("twice")};
     command.insert(command.end(), options.begin(), options.end());
-    return run_program(command, sandbox.folder()).value().output;
+    return run_program(command, sandbox.folder()).value();
   };
-  EXPECT_THAT(said({"--compiler", "strucpp", "--strucpp", sandbox.folder()}),
+  EXPECT_THAT(said({"--compiler", "strucpp", "--strucpp", sandbox.folder()}).output,
               HasSubstr("there is no built STruC++"));
-  EXPECT_THAT(said({"--compiler", "matiec", "--matiec", sandbox.folder()}), HasSubstr("there is no iec2c"));
-  EXPECT_THAT(said({"--compiler", "other"}), HasSubstr("--compiler other: allowed are matiec and strucpp"));
+  EXPECT_THAT(said({"--compiler", "matiec", "--matiec", sandbox.folder()}).output,
+              HasSubstr("there is no iec2c"));
+  const auto unknown = said({"--compiler", "other"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.output, HasSubstr("--compiler: other not in {matiec,strucpp}"));
 }
 
 }  // namespace

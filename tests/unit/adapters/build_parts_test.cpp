@@ -94,6 +94,7 @@ TEST_F(BuildParts, AnOutputIsAPlainFileInAFolderThatIsThere) {
   EXPECT_THAT(why_no_output(path("none/line.so")), HasSubstr("there is no folder"));
   EXPECT_THAT(why_no_output(path("")), HasSubstr("is a folder"));
   EXPECT_THAT(why_no_output("/dev/null"), HasSubstr("is not a plain file"));
+  EXPECT_THAT(why_no_output("/proc/line.so"), HasSubstr("no file can be made in the folder /proc: "));
   EXPECT_THAT(why_no_output(path("line.so")), IsEmpty());
 }
 
