@@ -237,13 +237,17 @@ std::unexpected<Error> SymbolTable::not_found(std::string_view name, std::string
         fmt::format("'{}': it is {}; name {}", shown(name), type_text(symbol),
                     symbol.dimensions.empty() ? symbol.name : "an element, as " + element_name(symbol, 0)));
   }
-  const std::string prefix = std::string(canonical) + ".";
-  const auto member = find_place(prefix);
-  if (member != symbols_.end() && same_variable_name(member->name.substr(0, prefix.size()), prefix)) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("'{}' has members; name one, as {}, or all, as {}.*", shown(name),
-                               member->name, shown(name)));
-  }
+  const auto begins_with = [&](const std::string& prefix) -> const VariableSymbol* {
+    const auto place = find_place(prefix);
+    const bool does =
+        place != symbols_.end() && same_variable_name(place->name.substr(0, prefix.size()), prefix);
+    return does ? &*place : nullptr;
+  };
+  if (const auto* const member = begins_with(fmt::format("{}.", canonical)))
+    return std::unexpected(
+        has_members(name, fmt::format("{}{}", shown(name), member->name.substr(canonical.size()))));
+  if (const auto* const member = begins_with(fmt::format("{}[", canonical)))
+    return std::unexpected(has_members(name, element_name(*member, 0)));
   // Comparing takes its time: with the neighbours only.
   constexpr std::ptrdiff_t kNeighbours = 200;
   const auto place = find_place(canonical);

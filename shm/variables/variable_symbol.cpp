@@ -110,6 +110,12 @@ int compare_variable_names(std::string_view left, std::string_view right) noexce
   return left.size() == right.size() ? 0 : left.size() < right.size() ? -1 : 1;
 }
 
+Error has_members(std::string_view name, std::string_view member) {
+  return {.code = ErrorCode::invalid_argument,
+          .system_errno = 0,
+          .message = fmt::format("'{}' has members; name one, as {}", shown(name), shown(member))};
+}
+
 std::string type_text(const VariableSymbol& symbol) {
   std::string text;
   for (const VariableDimension& dimension : symbol.dimensions) {

@@ -53,6 +53,10 @@ struct VariableSymbol {
   return compare_variable_names(left, right) == 0;
 }
 
+/// invalid_argument: `name` is that of a structure or function block, which has no value of its own.
+/// `member`: the name of one of its members.
+[[nodiscard]] Error has_members(std::string_view name, std::string_view member);
+
 /// "INT", "STRING[80]", "ARRAY [1..10, 0..3] OF INT".
 [[nodiscard]] std::string type_text(const VariableSymbol& symbol);
 /// "Pump[2].speed": the name of element number `element` (row-major, from 0); of no array: its name.

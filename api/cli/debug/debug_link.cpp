@@ -9,6 +9,7 @@
 #include "api/dds/text.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/names.hpp"
+#include "shm/variables/variable_symbol.hpp"
 
 namespace plchost {
 
@@ -149,10 +150,8 @@ Result<ListedVariable> DebugLink::variable(const std::string& instance, const st
   if (!instance.empty()) wholes.insert(wholes.begin(), fmt::format("{}.{}", instance, name));
   for (const std::string& whole : wholes) {
     const auto members = variables(whole + ".*");
-    if (!members || members->empty()) continue;
-    std::vector<std::string> names;
-    for (const auto& member : *members) names.emplace_back(dds::text_of(member.name));
-    return std::unexpected(error_of_structure(name, names));
+    if (members && !members->empty())
+      return std::unexpected(has_members(name, dds::text_of(members->front().name)));
   }
   return failure(ErrorCode::not_found, fmt::format("no variable '{}' in '{}'", shown(name),
                                                    instance.empty() ? instance_ : instance));

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/names.hpp"
+#include "shm/variables/variable_symbol.hpp"
 
 namespace plchost {
 
@@ -41,22 +41,13 @@ Result<const Json*> local_in(const Json& frame, std::string_view name) {
   const auto found = std::ranges::find_if(
       *locals, [&](const Json& local) { return same_name(local.value("name", ""), name); });
   if (found != locals->end()) return &*found;
-  std::vector<std::string> members;
   for (const Json& local : *locals) {
     const std::string member = local.value("name", "");
     const bool is_inside = member.size() > name.size() && member[name.size()] == '.';
     if (!name.empty() && is_inside && same_name(std::string_view(member).substr(0, name.size()), name))
-      members.push_back(member);
+      return std::unexpected(has_members(name, member));
   }
-  if (members.empty()) return nullptr;
-  return std::unexpected(error_of_structure(name, members));
-}
-
-Error error_of_structure(std::string_view name, std::span<const std::string> members) {
-  return {.code = ErrorCode::invalid_argument,
-          .system_errno = 0,
-          .message = fmt::format("'{}' is a structure or function block: name one of its members {}",
-                                 shown(name), join_some(members))};
+  return nullptr;
 }
 
 Error error_in_frame(const Json& frame, Error error) {

@@ -20,9 +20,6 @@ namespace plchost {
 /// the state was too long to tell them. invalid_argument: it is a structure.
 [[nodiscard]] Result<const nlohmann::json*> local_in(const nlohmann::json& frame, std::string_view name);
 
-/// That a name means a structure or function block, which has no value of its own.
-[[nodiscard]] Error error_of_structure(std::string_view name, std::span<const std::string> members);
-
 /// The error of a name that means nothing in a frame. It says which local variables a frame does not show.
 [[nodiscard]] Error error_in_frame(const nlohmann::json& frame, Error error);
 

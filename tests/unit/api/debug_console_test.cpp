@@ -104,15 +104,13 @@ TEST_F(DebugConsoleFrames, WhoseLocalVariablesAreNotToldMeanNoOthers) {
 TEST_F(DebugConsoleFrames, HaveStructuresWithoutAValue) {
   instance_.variables.push_back(variable_record("Main.c.pt.x", "INT", "1"));
   instance_.variables.push_back(variable_record("Main.c.pt.y", "INT", "2"));
-  EXPECT_THAT(said("print pt"), HasSubstr("'pt' is a structure or function block: name one of its members "
-                                          "Main.c.pt.x, Main.c.pt.y"));
-  EXPECT_THAT(said("print Main.c.pt"), HasSubstr("name one of its members Main.c.pt.x"));
+  EXPECT_THAT(said("print pt"), HasSubstr("'pt' has members; name one, as Main.c.pt.x"));
+  EXPECT_THAT(said("print Main.c.pt"), HasSubstr("'Main.c.pt' has members; name one, as Main.c.pt.x"));
   EXPECT_THAT(said("print none"), HasSubstr("no variable 'none' in 'Main.c'; arrays, references and function "
                                             "blocks among local variables are not shown"));
   instance_.tasks[0]["stack"][1]["locals"].push_back({{"name", "at.y"}, {"type", "INT"}, {"value", "4"}});
   (void)said("up");
-  EXPECT_THAT(said("print AT"),
-              HasSubstr("'AT' is a structure or function block: name one of its members at.y"));
+  EXPECT_THAT(said("print AT"), HasSubstr("'AT' has members; name one, as at.y"));
   EXPECT_EQ(said("print at.y"), "at.y = 4\n");
 }
 

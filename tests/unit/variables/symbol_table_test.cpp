@@ -64,7 +64,9 @@ TEST(SymbolTable, NamesAreSortedAndFoundWithoutCase) {
 
 TEST(SymbolTable, OtherNamesAreRefusedWithTheReason) {
   const SymbolTable table = plant();
-  EXPECT_EQ(found(table, "main"), "'main' has members; name one, as Main.Name, or all, as main.*");
+  EXPECT_EQ(found(table, "main"), "'main' has members; name one, as main.Name");
+  EXPECT_EQ(found(table, "Pump[3]"), "'Pump[3]' has members; name one, as Pump[3].speed");
+  EXPECT_EQ(found(table, "Pump"), "'Pump' has members; name one, as Pump[2].speed");
   EXPECT_EQ(found(table, "Main.spede"), "no variable 'Main.spede' (did you mean 'Main.speed'?)");
   EXPECT_EQ(found(table, "Elsewhere"), "no variable 'Elsewhere'");
   EXPECT_EQ(found(table, "Line.temperature"),
