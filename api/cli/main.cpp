@@ -20,6 +20,7 @@
 #include "api/cli/verbs/word_hint.hpp"
 #include "api/cli/words/completion.hpp"
 #include "api/cli/words/man_page.hpp"
+#include "api/cli/words/number_range.hpp"
 #include "api/cli/words/overview.hpp"
 #include "api/cli/words/short_form.hpp"
 #include "shm/base/names.hpp"
@@ -58,7 +59,7 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
   constexpr double kMaxTimeout = 3600;
   app.add_option("--timeout", options.timeout_s,
                  "seconds to wait for an answer (default 3; commands that end a cycle or a process: 80)")
-      ->check(CLI::Range(kMinTimeout, kMaxTimeout))
+      ->check(plchost::number_range(kMinTimeout, kMaxTimeout))
       ->take_last();
   app.add_option_function<std::string>(
          "-o,--output",
@@ -88,7 +89,7 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
   app.add_flag("-q,--quiet", options.quiet, "print errors only, and no confirmations");
   app.add_flag("-w,--watch", options.watch, "list and show: again and again, until Ctrl-C");
   app.add_option("--every", options.every_s, "seconds between two looks of --watch (default 2)")
-      ->check(CLI::Range(kMinTimeout, kMaxTimeout))
+      ->check(plchost::number_range(kMinTimeout, kMaxTimeout))
       ->take_last();
   app.add_option("--color", options.colour,
                  "states in colours: auto (on a terminal, unless NO_COLOR is set), always, never")

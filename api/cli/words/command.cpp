@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "api/cli/words/number_range.hpp"
+
 namespace plchost {
 
 namespace {
@@ -99,7 +101,7 @@ const Command& Command::option(const char* name, std::string& value, const char*
 template <class Number>
 const Command& Command::option(const char* name, Number& value, const char* text, Number least,
                                Number most) const {
-  app_->add_option(name, value, text)->check(CLI::Range(least, most));
+  app_->add_option(name, value, text)->check(number_range(least, most));
   return *this;
 }
 

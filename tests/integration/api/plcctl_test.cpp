@@ -155,6 +155,18 @@ TEST_F(Plcctl, TakesSeveralNamesAndPatterns) {
   EXPECT_EQ(run({"list", "instances", "--columns", "nmae"}).code, 2);
 }
 
+TEST_F(Plcctl, TakesNoTimeThatIsNoNumber) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"--timeout", "nan", "list", "hosts"},
+        {"list", "hosts", "--watch", "--every", "nan"},
+        {"watch", "variables", "line1", "n", "--interval", "nan"},
+        {"record", "variables", "line1", "n", "--duration", "-NaN"}}) {
+    const auto refused = run(words);
+    EXPECT_EQ(refused.code, 2) << words.front();
+    EXPECT_THAT(refused.errors, HasSubstr("is no number"));
+  }
+}
+
 TEST_F(Plcctl, WaitsForTheStateOfInstances) {
   EXPECT_EQ(run({"wait", "instance", "line1"}).output, "line1: running\n");
   EXPECT_EQ(run({"wait", "instance", "line1", "-q"}).output, "");
