@@ -42,6 +42,7 @@ Row uptime_s(const HostView& host, const std::optional<ClockOffset>& clock) {
 dds::Computed<plc_HostStatus, Row> computed_of(const plc_HostStatus& status, const HostView& host,
                                                const std::optional<ClockOffset>& clock) {
   const bool follows = status.grid_instances != 0;
+  const bool measured = follows && status.grid_measured != 0;
   return {.state = host.silent ? "silent" : "alive",
           .uptime_s = uptime_s(host, clock),
           .started_unix_s = status.started_unix_ns / kSecond,
@@ -51,7 +52,7 @@ dds::Computed<plc_HostStatus, Row> computed_of(const plc_HostStatus& status, con
           .load = load_of(status),
           .clock_offset_us = clock ? Row(to_us(clock->offset.count())) : Row(),
           .clock_uncertainty_us = clock ? Row(to_us(clock->uncertainty.count())) : Row(),
-          .grid_offset_us = follows ? Row(to_us(status.grid_offset_ns)) : Row(),
+          .grid_offset_us = measured ? Row(to_us(status.grid_offset_ns)) : Row(),
           .grid_in_sync = follows ? Row(status.grid_in_sync == status.grid_instances) : Row(),
           .server_pid = host.server_pid,
           .problem = problem_of(host)};

@@ -26,17 +26,17 @@ void HostGrid::add(const ClockRuntime& clock) {
   const std::int64_t offset_ns = to_hundreds(clock.offset_ns);
   // One that runs freely has not measured anything yet.
   const bool measures = clock.state != kFreeRunning;
-  const bool further = !measured_ || std::abs(offset_ns) > std::abs(offset_ns_);
+  const bool further = measured_ == 0 || std::abs(offset_ns) > std::abs(offset_ns_);
   if (reference_.empty() || (measures && further)) reference_ = clock.reference.view();
-  if (!measures || !further) return;
-  measured_ = true;
-  offset_ns_ = offset_ns;
+  if (measures && further) offset_ns_ = offset_ns;
+  if (measures) ++measured_;
 }
 
 void HostGrid::put(plc_HostStatus& sample) const noexcept {
   dds::copy_text(sample.grid_reference, reference_);
   sample.grid_instances = instances_;
   sample.grid_in_sync = in_sync_;
+  sample.grid_measured = measured_;
   sample.grid_offset_ns = offset_ns_;
 }
 

@@ -22,7 +22,7 @@ class HostGrid {
  private:
   std::uint32_t instances_ = 0;  // that follow a reference clock
   std::uint32_t in_sync_ = 0;    // of them
-  bool measured_ = false;        // offset_ns_ is of one of them
+  std::uint32_t measured_ = 0;   // of them: offset_ns_ is of one
   std::int64_t offset_ns_ = 0;   // the furthest
   std::string reference_;        // of the instance that is the furthest off
 };

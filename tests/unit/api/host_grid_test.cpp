@@ -52,10 +52,12 @@ TEST(HostGrid, AnInstanceWithoutItsClockIsNotInSyncAndHasNoOffset) {
   HostGrid sut;
   sut.add(clock_with(free_running, 900'000, "bus1"));
   EXPECT_EQ(dds::text_of(put(sut).grid_reference), "bus1");
+  EXPECT_EQ(put(sut).grid_measured, 0U);
   sut.add(clock_with(locked, 0, "tai"));
   const plc_HostStatus status = put(sut);
   EXPECT_EQ(status.grid_instances, 2U);
   EXPECT_EQ(status.grid_in_sync, 1U);
+  EXPECT_EQ(status.grid_measured, 1U);
   EXPECT_EQ(status.grid_offset_ns, 0);
   EXPECT_EQ(dds::text_of(status.grid_reference), "tai");
 }

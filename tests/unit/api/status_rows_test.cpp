@@ -163,6 +163,10 @@ TEST(StatusRows, OfAHostTellHowFarItsCyclesAreFromTheClockThatTheyFollow) {
   host.status.grid_offset_ns = -1'300;
   dds::copy_text(host.status.grid_reference, "ptp:/dev/ptp0");
   Row row = to_row(host, std::nullopt);
+  EXPECT_TRUE(row.at("grid_offset_us").is_null()) << "none has measured it";
+  EXPECT_EQ(row.at("grid_in_sync"), false);
+  host.status.grid_measured = 1;
+  row = to_row(host, std::nullopt);
   EXPECT_EQ(row.at("grid_reference"), "ptp:/dev/ptp0");
   EXPECT_EQ(row.at("grid_offset_us"), -1.3);
   EXPECT_EQ(row.at("grid_in_sync"), false);
