@@ -141,12 +141,16 @@ AuditWriter::Ticket RequestAudit::answered(const plc_SampleIdentity& identity, E
 void RequestAudit::refuse(const dds::Guid& client, AuditRecord record, TimePoint now) {
   record.time_unix_ns = unix_time_ns();
   const bool is_one_more = refusals_.size() >= kMostRefused && !refusals_.contains(client);
-  Refusals& refusals = refusals_[is_one_more ? dds::Guid{} : client];
-  if (now < refusals.next) {
+  const auto [entry, is_new] = refusals_.try_emplace(is_one_more ? dds::Guid{} : client);
+  Refusals& refusals = entry->second;
+  if (is_new && !is_one_more) refusals.spare = kRefusedAtOnce - 1;
+  const bool soon = now < refusals.next;
+  if (soon && refusals.spare == 0) {
     ++refusals.count;
     refusals.last = std::move(record);
     return;
   }
+  if (soon) --refusals.spare;
   tell_refused(refusals, now);
   refusals.next = now + kRefusedPeriod;
   (void)writer_->write_refused(std::move(record));

@@ -20,12 +20,14 @@ namespace plchost {
 /// The changes by clients, in the audit log: each request that changes something and was not refused, with
 /// its answer. For each source of posts it has the events and how many posts were taken, at its first, then
 /// at most once in kPostPeriod. Requests and posts that were refused go into a log of their own, so that they
-/// never push out what was done. That log has the first one of a client, then once in kRefusedPeriod how
+/// never push out what was done. That log has the first ones of a client, then once in kRefusedPeriod how
 /// many. Control loop only.
 class RequestAudit {
  public:
   static constexpr Duration kPostPeriod = std::chrono::seconds(60);
   static constexpr Duration kRefusedPeriod = std::chrono::seconds(1);
+  /// So many requests of a client are told one by one, and so many more after kPostPeriod without any.
+  static constexpr std::size_t kRefusedAtOnce = 16;
 
   /// The identity of a client, for the record's `who` and `from`. By its participant.
   using Describe = std::function<void(const dds::Guid& client, AuditRecord& record)>;
@@ -81,6 +83,7 @@ class RequestAudit {
   struct Refusals {
     AuditRecord last;
     std::uint64_t count = 0;  // not told yet
+    std::size_t spare = 0;    // so many more are told before `next`
     TimePoint next{};
   };
   struct UnderWay {

@@ -170,8 +170,26 @@ TEST_F(RequestAuditTest, RefusalsOfAClientAreSummedAndPushOutNothingThatWasDone)
   sut->flush();
   EXPECT_EQ(records(), before);
   const std::string refused = refusals();
-  EXPECT_LE(std::ranges::count(refused, '\n'), 2 + 2 * kSeconds);
+  EXPECT_LE(std::ranges::count(refused, '\n'),
+            2 + 2 * kSeconds + static_cast<std::ptrdiff_t>(RequestAudit::kRefusedAtOnce));
   EXPECT_THAT(refused, AllOf(HasSubstr("no such file"), HasSubstr("within 1 s")));
+}
+
+TEST_F(RequestAuditTest, TheFirstRefusalsOfAClientAreEachTold) {
+  const auto sut = make();
+  plc_Request wrong = load(2);
+  for (std::size_t i = 1; i <= RequestAudit::kRefusedAtOnce; ++i) {
+    ++wrong.header.request_identity.sequence_number;
+    sut->refused(client(2), wrong,
+                 {.code = ErrorCode::refused,
+                  .system_errno = 0,
+                  .message = "number " + std::to_string(i) + " is refused"},
+                 kNow);
+  }
+  sut->flush();
+  const std::string refused = refusals();
+  for (std::size_t i = 1; i <= RequestAudit::kRefusedAtOnce; ++i)
+    EXPECT_THAT(refused, HasSubstr("\"number " + std::to_string(i) + " is refused\""));
 }
 
 TEST_F(RequestAuditTest, WhatTimedOutMayHaveBeenDone) {
@@ -190,6 +208,7 @@ TEST_F(RequestAuditTest, ClientsThatAreRefusedHaveABound) {
     dds::Guid stranger;
     stranger.bytes[0] = static_cast<std::uint8_t>(i);
     stranger.bytes[1] = static_cast<std::uint8_t>(i >> 8U);
+    stranger.bytes[2] = 1;  // no client is called 0
     sut->refused(stranger, load(1), error, kNow);
   }
   sut->flush();
