@@ -1,5 +1,7 @@
 // The lists that a ControlServer answers by itself, from shared memory or by asking an instance.
 
+#include <algorithm>
+#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,12 +69,16 @@ void ControlServer::Parts::read_log(const dds::Guid& client, const plc_Request& 
   send_page(client, request.header.request_identity, sample.page());
 }
 
-// The instance is asked, which takes a little.
+// The instance is asked, which takes a little. Its client is told shortly before it gives up by itself.
 void ControlServer::Parts::list_variables(const dds::Guid& client, const plc_Request& request) {
   const plc_SampleIdentity& identity = request.header.request_identity;
+  constexpr Duration kOnTheWay = std::chrono::milliseconds(50);
+  const TimePoint now = MonotonicClock::now();
+  const Duration left(request.limit.clock_ns - boot_time_ns());
   const auto begun = variables->begin(
       {.client = client, .identity = identity, .instance = std::string(dds::text_of(request.instance))},
-      variable_query_of(request.part), MonotonicClock::now());
+      variable_query_of(request.part), now,
+      now + std::min<Duration>(left, VariableLister::kMostPatience) - kOnTheWay);
   if (!begun) tell(client, identity, begun.error().code, begun.error().describe());
 }
 

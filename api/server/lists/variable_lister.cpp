@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -37,14 +38,20 @@ Result<VariableLister> VariableLister::create(std::string pool, std::string run_
   return VariableLister(std::move(pool), std::move(run_directory), UniqueFd(epoll));
 }
 
-Result<void> VariableLister::begin(Asker asker, VariableQuery query, TimePoint now) {
+Result<void> VariableLister::begin(Asker asker, VariableQuery query, TimePoint now, TimePoint deadline) {
   const auto of_client = std::ranges::count_if(
       pending_, [&](const auto& entry) { return entry.second.asker.client == asker.client; });
-  if (pending_.size() >= kMaxPending || of_client >= std::ptrdiff_t{kMaxPendingOfClient}) {
+  const auto of_instance = std::ranges::count_if(
+      pending_, [&](const auto& entry) { return entry.second.asker.instance == asker.instance; });
+  if (pending_.size() >= kMaxPending || of_client >= std::ptrdiff_t{kMaxPendingOfClient} ||
+      of_instance >= std::ptrdiff_t{kMaxPendingOfInstance}) {
     return failure(ErrorCode::busy,
                    fmt::format("{} lists of variables are under way; ask again", pending_.size()));
   }
-  Pending pending{.asker = std::move(asker), .query = std::move(query), .deadline = now + kPatience};
+  Pending pending{.asker = std::move(asker),
+                  .query = std::move(query),
+                  .begin = now,
+                  .deadline = std::min<TimePoint>(deadline, now + kMostPatience)};
   const std::uint64_t number = next_number_++;
   if (const auto asked = ask_first(pending, number); !asked)
     return std::unexpected(named(asked.error(), pending.asker.instance));
@@ -117,6 +124,14 @@ Result<void> VariableLister::Peer::ask(ValueRequest request) {
 Result<void> VariableLister::Peer::ask_next() {
   if (!requests.empty()) requests.pop_front();
   return requests.empty() ? Result<void>() : link.send(requests.front());
+}
+
+// The first one is under way: the next one waits for its reply all the same.
+void VariableLister::Peer::forget(std::uint64_t number) {
+  if (requests.empty()) return;
+  const auto waiting = std::next(requests.begin());
+  const auto gone = std::ranges::remove(waiting, requests.end(), number, &ValueRequest::number);
+  requests.erase(gone.begin(), gone.end());
 }
 
 // Another application, or version, has taken over since the table was read.
@@ -225,18 +240,23 @@ std::vector<VariableLister::Finished> VariableLister::receive() {
 
 std::vector<VariableLister::Finished> VariableLister::expire(TimePoint now) {
   std::vector<Finished> finished;
-  for (;;) {
-    const auto late =
-        std::ranges::find_if(pending_, [&](const auto& entry) { return now >= entry.second.deadline; });
-    if (late == pending_.end()) return finished;
-    // The others wait behind it.
-    drop(std::string(late->second.asker.instance),
-         {.code = ErrorCode::timed_out,
-          .system_errno = 0,
-          .message =
-              fmt::format("it has not answered within {} ms", kPatience / std::chrono::milliseconds(1))},
-         finished);
+  for (auto entry = pending_.begin(); entry != pending_.end();) {
+    Pending& pending = entry->second;
+    if (now < pending.deadline) {
+      ++entry;
+      continue;
+    }
+    const std::string& instance = pending.asker.instance;
+    if (const auto peer = peers_.find(instance); peer != peers_.end()) peer->second.forget(entry->first);
+    const auto patience = (pending.deadline - pending.begin) / std::chrono::milliseconds(1);
+    Error late = named({.code = ErrorCode::timed_out,
+                        .system_errno = 0,
+                        .message = fmt::format("it has not answered within {} ms", patience)},
+                       instance);
+    finished.push_back({std::move(pending.asker), std::unexpected(std::move(late))});
+    entry = pending_.erase(entry);
   }
+  return finished;
 }
 
 }  // namespace plchost

@@ -25,11 +25,12 @@ namespace plchost {
 /// over its values socket. Never waits. Control loop only.
 class VariableLister {
  public:
-  /// How many lists may be under way, together and of one client.
+  /// How many lists may be under way: together, of one client, and of one instance, which may not answer.
   static constexpr std::size_t kMaxPending = 32;
   static constexpr std::size_t kMaxPendingOfClient = 8;
-  /// So long an instance may take for its answer: it looks for a moment between cycles for kSampleLimit.
-  static constexpr Duration kPatience = std::chrono::seconds(1);
+  static constexpr std::size_t kMaxPendingOfInstance = 16;
+  /// An instance may take no longer for its answer, whatever its client says.
+  static constexpr Duration kMostPatience = std::chrono::hours(1);
 
   /// A list that was asked for.
   struct Asker {
@@ -46,9 +47,10 @@ class VariableLister {
 
   /// Readable when receive() has something to do.
   [[nodiscard]] int fd() const noexcept { return epoll_.get(); }
-  /// Begins with it; the end is told by receive() or expire(). busy: too many are under way. not_found: the
-  /// instance declares no variables, or there is no such variable. unavailable: its process has ended.
-  [[nodiscard]] Result<void> begin(Asker asker, VariableQuery query, TimePoint now);
+  /// Begins with it; the end is told by receive(), or by expire() at the deadline. busy: too many are under
+  /// way. not_found: the instance declares no variables, or there is no such variable. unavailable: its
+  /// process has ended.
+  [[nodiscard]] Result<void> begin(Asker asker, VariableQuery query, TimePoint now, TimePoint deadline);
   [[nodiscard]] bool is_pending(const plc_SampleIdentity& identity) const;
   [[nodiscard]] std::vector<Finished> receive();
   /// Those that were not answered in time.
@@ -58,6 +60,7 @@ class VariableLister {
   struct Pending {
     Asker asker;
     VariableQuery query;
+    TimePoint begin;
     TimePoint deadline;
     std::shared_ptr<const SymbolTable> table = {};
     VariableSelection selection = {};
@@ -74,6 +77,8 @@ class VariableLister {
     [[nodiscard]] Result<void> ask(ValueRequest request);
     /// The first one has its reply.
     [[nodiscard]] Result<void> ask_next();
+    /// Nobody waits for its reply any more.
+    void forget(std::uint64_t number);
   };
 
   VariableLister(std::string pool, std::string run_directory, UniqueFd epoll)

@@ -49,7 +49,7 @@ trap clean_up EXIT
 # Its leaks end with it, and a sanitizer would take as long to look for them as it lives.
 plcctl() { ASAN_OPTIONS=${ASAN_OPTIONS:-}:detect_leaks=0 "$BIN/plcctl" --timeout 10 "$@"; }
 
-# asked COMMAND...: again while nobody answers (exit code 3). A look at variables waits 1 s for its instance.
+# asked COMMAND...: again while nobody answers (exit code 3)
 asked() {
   local try code
   for try in 1 2 3 4 5; do

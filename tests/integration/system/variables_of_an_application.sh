@@ -133,8 +133,10 @@ echo "- an instance that stands still answers no longer, the others do"
 pid=$(instance line1 pid)
 kill -STOP "$pid"
 code=0
-said=$(plcctl read variable line1 line.total 2>&1) || code=$?
-[ "$code" -eq 3 ] && grep -q "has not answered" <<<"$said" || fail "exit code $code: $said"
+began=${EPOCHREALTIME//[.,]/}
+said=$(plcctl --timeout 2 read variable line1 line.total 2>&1) || code=$?
+[ "$code" -eq 3 ] && grep -q "line1': it has not answered within" <<<"$said" || fail "exit code $code: $said"
+[ $((${EPOCHREALTIME//[.,]/} - began)) -ge 1900000 ] || fail "it has not waited as long as --timeout says"
 plcctl list instances >/dev/null
 kill -CONT "$pid"
 until_true 20 follows 21
