@@ -27,6 +27,7 @@
 #include "shm/base/time.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
+#include "shm/variables/order_text.hpp"
 
 namespace plchost {
 
@@ -368,7 +369,8 @@ void ControlServer::Parts::answer_finished(TimePoint now) {
   unanswered_since.reset();
   for (const FinishedCommand& command : std::exchange(unanswered, {})) {
     downloads.end(command.command.identity);
-    answer(command.command.client, command.command.identity, command.code, command.text);
+    answer_recorded(command.command.client, command.command.identity, command.code, text_for_client(command),
+                    command.text);
   }
 }
 
@@ -406,10 +408,21 @@ bool ControlServer::Parts::collect_findings(FinishedCommand& finished) {
   return asked;
 }
 
-void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
-                                  std::string_view text) {
+// The answer to a write tells the value that was there.
+std::string_view ControlServer::Parts::text_for_client(const FinishedCommand& command) const {
+  const ControlVerb verb = command.command.verb;
+  const bool has_values = command.code == ErrorCode::ok &&
+                          (verb == ControlVerb::write_variable || verb == ControlVerb::force_variable);
+  if (!has_values) return command.text;
+  const auto may =
+      options.variable_rights.check(OperationRight::read_variables, guard, command.command.client);
+  return may ? command.text : without_values(command.text);
+}
+
+void ControlServer::Parts::answer_recorded(const dds::Guid& client, const plc_SampleIdentity& identity,
+                                           ErrorCode code, std::string_view text, std::string_view recorded) {
   const TimePoint now = MonotonicClock::now();
-  const AuditWriter::Ticket ticket = audit->answered(identity, code, text, now);
+  const AuditWriter::Ticket ticket = audit->answered(identity, code, recorded, now);
   if (audit->is_written(ticket)) return send_answer(client, identity, code, text);
   late_answers.push_back({client, identity, code, std::string(text), ticket, now + kAuditPatience});
 }

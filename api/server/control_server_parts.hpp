@@ -75,7 +75,13 @@ struct ControlServer::Parts {
   void tell_of_refused(TimePoint now);
   void refuse(const dds::Guid& client, const plc_Request& request, const Error& error);
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
-              std::string_view text);
+              std::string_view text) {
+    answer_recorded(client, identity, code, text, text);
+  }
+  /// `recorded`: the text for the audit log.
+  void answer_recorded(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
+                       std::string_view text, std::string_view recorded);
+  [[nodiscard]] std::string_view text_for_client(const FinishedCommand& command) const;
   void send_answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
                    std::string_view text);
   void tell(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,

@@ -10,6 +10,7 @@
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 #include "shm/operations/operations.hpp"
+#include "shm/variables/order_text.hpp"
 
 namespace plchost {
 
@@ -91,7 +92,8 @@ void Instance::advance_orders() {
     }
     if (fine) {
       reply.text = variables.describe(*first.order);
-      spdlog::info("variable {}", reply.text);
+      // Operators read the log, also where they may not read variables.
+      spdlog::info("variable {}", without_values(reply.text));
       beat();  // so that the client finds the number of forces in the page
     } else {
       reply = {.number = 0, .code = fine.error().code, .text = fine.error().describe()};

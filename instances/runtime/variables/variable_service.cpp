@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
+#include "shm/variables/order_text.hpp"
 
 namespace plchost {
 
@@ -168,8 +169,8 @@ std::string VariableService::describe(const VariableOrder& order) const {
   }
   const VariableElement element = order.elements.front();
   const bool forces = order.kind == VariableOrder::Kind::force;
-  std::string text = fmt::format("'{}' is {}: {} -> {}", access_.name(element), forces ? "forced" : "written",
-                                 access_.text(element, order.before), access_.text(element, order.value));
+  std::string text = order_text(access_.name(element), forces, access_.text(element, order.before),
+                                access_.text(element, order.value));
   if (const auto* const forced = forces_.find(element); forced != nullptr && !forces) {
     text += fmt::format("; it is forced to {}, which overrides it in the next cycle",
                         access_.text(element, *forced));

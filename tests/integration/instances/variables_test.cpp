@@ -86,7 +86,7 @@ TEST_F(Variables, AWriteTakesEffectOnce) {
   EXPECT_EQ(write("Line.temperature[10]=-1.5").code, ErrorCode::ok);
   EXPECT_EQ(read("Line.temperature[10]"), "-1.5");
   EXPECT_EQ(read("Line.temperature[9]"), "0.0");
-  EXPECT_THAT(process_->log(), HasSubstr("variable 'Main.text' is written: 'hello' -> 'it$'s'"));
+  EXPECT_THAT(process_->log(), HasSubstr("variable 'Main.text' is written\n"));
 }
 
 TEST_F(Variables, AForceHoldsAtBothEdgesOfEachCycle) {

@@ -42,6 +42,21 @@ refused "[host] write_variables" as anna force variable line1 line.setpoint=22
 refused "[host] write_variables" as anna unforce variable line1 --all
 is "$(value otto line.setpoint)" 21 || fail "a refused value was written: $(value otto line.setpoint)"
 
+echo "- who may write and not read is told no values"
+sed -i '/^pool = /a write_variables = "operator"' "$cell/cell1.toml"
+as otto reload host >/dev/null
+wrote() { as anna write variable line1 line.setpoint=21 >"$cell/wrote.txt" 2>&1; }
+until_true 20 wrote
+is "$(cat "$cell/wrote.txt")" "'line.setpoint' is written" || fail "$(cat "$cell/wrote.txt")"
+is "$(as otto write variable line1 line.setpoint=21)" "'line.setpoint' is written: 21 -> 21" || fail "an engineer is told values"
+refused "[host] read_variables" as anna read variable line1 line.setpoint
+as anna logs line1 | grep -q "variable 'line.setpoint' is written$" || fail "$(as anna logs line1)"
+as anna logs line1 | grep -q -- '-> 21' && fail "operators are told values by the log"
+sed -i '/^write_variables = /d' "$cell/cell1.toml"
+as otto reload host >/dev/null
+unwrites() { ! as anna write variable line1 line.setpoint=21; }
+until_true 20 unwrites
+
 echo "- viewers and operators, by two keys of [host]"
 sed -i '/^pool = /a read_variables = "viewer"\nwrite_variables = "operator"' "$cell/cell1.toml"
 as otto reload host | grep -q '^\[host\] read_variables changed, used at once; plchost-dds is restarted' || fail "the answer of the reload"
@@ -55,12 +70,43 @@ refused "plc/v1/op/request: the permissions of this identity do not allow it" as
 as anna unforce variable line1 --all
 is "$(value anna line.setpoint)" 23 || fail "$(value anna line.setpoint)"
 
+echo "- a watch ends with the right to it, or with its identity"
+# watches NAME: in the background, "$cell/NAME.watch"
+watches() {
+  "$BIN/plcctl" --identity "$plant/$1" watch variables line1 fast.count --interval 0.05 >"$cell/$1.watch" 2>&1 &
+  others+=($!)
+  seen() { [ "$(grep -c fast.count "$cell/$1.watch")" -gt 2 ]; }
+  until_true 20 seen "$1"
+}
+watches panel
+watcher=${others[-1]}
+sed -i 's/^read_variables = .*/read_variables = "operator"/' "$cell/cell1.toml"
+as otto reload host >/dev/null
+code=0
+wait "$watcher" || code=$?
+is "$code" 1 || fail "exit code $code of a watch whose right has ended: $(tail -n 3 "$cell/panel.watch")"
+grep -q "'panel' is viewer; this takes the role operator" "$cell/panel.watch" || fail "$(tail -n 3 "$cell/panel.watch")"
+plcctl security add-identity engineer leaver >/dev/null
+known() { as leaver read variable line1 fast.count; }
+until_true 20 known
+watches leaver
+plcctl security revoke leaver >/dev/null
+cut_off() { grep -q "has not answered" "$cell/leaver.watch"; }
+until_true 20 cut_off
+lines=$(wc -l <"$cell/leaver.watch")
+is "$(value otto line.setpoint)" 23 || fail "others are not served any more"
+sleep 1
+is "$(wc -l <"$cell/leaver.watch")" "$lines" || fail "a revoked identity sees values: $(tail -n 3 "$cell/leaver.watch")"
+kill "${others[-1]}"
+
 echo "- in the audit log, each with its principal"
 audit=$cell/cell1.state/audit.cell1
 told() { cat "$1"/audit.*.log | jq -r 'select(.what | test("variable")) | "\(.who): \(.what) \(.argument)"'; }
 is "$(told "$audit")" "engineer otto: write variable line.setpoint=21
 engineer otto: force variable line.total=7
 engineer otto: unforce variable line.total
+operator anna: write variable line.setpoint=21
+engineer otto: write variable line.setpoint=21
 operator anna: write variable line.setpoint=23
 operator anna: force variable line.total=8
 operator anna: unforce variable *" || fail "$(told "$audit")"
