@@ -5,7 +5,7 @@
 
 namespace plchost {
 
-/// What was done to a variable, and its values before and since: "'Main.speed' is written: 5 -> 7".
+/// Tells a change of a variable, with its values before and since: "'Main.speed' is written: 5 -> 7".
 [[nodiscard]] std::string order_text(std::string_view name, bool forces, std::string_view before,
                                      std::string_view now);
 /// Such a text for those who may not read variables: "'Main.speed' is written".

@@ -19,7 +19,7 @@ using testing::IsEmpty;
 class BareVariables : public SecuredHost {
  protected:
   BareVariables() { start(); }
-  /// What the host answers to a request of `client` that `forge` has altered.
+  /// The host's answer to a request of `client` that `forge` has altered.
   std::string told(
       RawClient& client, const dds::TopicInfo& topic, std::int32_t operation,
       const std::function<void(plc_Request&)>& forge = [](plc_Request& /*as it is*/) {}) {

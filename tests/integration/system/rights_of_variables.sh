@@ -42,7 +42,7 @@ refused "[host] write_variables" as anna force variable line1 line.setpoint=22
 refused "[host] write_variables" as anna unforce variable line1 --all
 is "$(value otto line.setpoint)" 21 || fail "a refused value was written: $(value otto line.setpoint)"
 
-echo "- who may write and not read is told no values"
+echo "- a client that may write and not read is told no values"
 sed -i '/^pool = /a write_variables = "operator"' "$cell/cell1.toml"
 as otto reload host >/dev/null
 wrote() { as anna write variable line1 line.setpoint=21 >"$cell/wrote.txt" 2>&1; }
