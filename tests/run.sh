@@ -227,7 +227,7 @@ case "${1:-}" in
     join build_asan "address and undefined sanitizers: build"
     run "address and undefined sanitizers: tests" tests .build/asan "${whole[@]}"
     count
-    # Of the integration tests only those of the API (tests/README.md).
+    # Of the integration tests only those of the API and of Modbus (tests/README.md).
     join build_tsan "thread sanitizer: build"
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count

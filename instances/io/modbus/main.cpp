@@ -8,12 +8,15 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
 #include "instances/io/modbus/config/load_modbus.hpp"
 #include "instances/io/modbus/modbus_process.hpp"
+#include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
@@ -48,9 +51,21 @@ UniqueFd take_signals() {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);  // of the terminal that is closed
   ::sigprocmask(SIG_SETMASK, &signals, nullptr);
   (void)std::signal(SIGPIPE, SIG_IGN);
   return UniqueFd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+// Two processes of one file would write the outputs of the same devices. Images of inputs and the port of the
+// server are refused to the second one in any case. The kernel ends the claim with the process.
+Result<UniqueFd> hold_alone(const std::string& file) {
+  UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) return failure(ErrorCode::system, file, errno);
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
+  if (errno != EWOULDBLOCK) return failure(ErrorCode::system, file, errno);
+  return failure(ErrorCode::busy,
+                 fmt::format("{}: another plchost-modbus runs with this file; end that one first", file));
 }
 
 int check_only(const std::string& file) {
@@ -71,6 +86,11 @@ int run(const Options& options) {
     return EXIT_FAILURE;
   }
   start_log("plchost-modbus", options.log_level.empty() ? config->process.log_level : options.log_level);
+  const auto alone = hold_alone(options.config);
+  if (!alone) {
+    spdlog::error("{}", alone.error().describe());
+    return EXIT_FAILURE;
+  }
   const UniqueFd signals = take_signals();
   if (!signals) {
     spdlog::error("signalfd: {}", errno);

@@ -73,6 +73,7 @@ Result<void> ModbusProcess::run(int signals) {
   while (::poll(&signal, 1, static_cast<int>(kShow.count())) == 0 || errno == EINTR) {
     if (signal.revents != 0) break;
     const TimePoint now = MonotonicClock::now();
+    for (const auto& device : devices_) device->count();
     show(now, false);
     repair(now);
   }

@@ -263,6 +263,60 @@ TEST(ModbusDevices, AResponseThatNeverEndsIsALostDevice) {
   EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
 }
 
+struct WrongAnswer {
+  Mode mode;
+  const char* told;
+};
+class ModbusWrongAnswer : public ::testing::TestWithParam<WrongAnswer> {};
+
+// A gateway that mixes up its devices answers so. Its values are not taken.
+TEST_P(ModbusWrongAnswer, IsALostDevice) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, GetParam().mode);
+  measure(peer, 5);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  EXPECT_TRUE(eventually([&] {
+    plant.put_out(0, 99);
+    return sut.logged(GetParam().told);
+  })) << sut.log();
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); }));
+  EXPECT_EQ(plant.input_word(0), 0);
+  peer.set(Mode::normal);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good) && plant.input_word(0) == 5; }));
+}
+INSTANTIATE_TEST_SUITE_P(Each, ModbusWrongAnswer,
+                         ::testing::Values(WrongAnswer{Mode::other_unit,
+                                                       "the response is of unit 2, not of 1"},
+                                           WrongAnswer{Mode::other_length, "is lost: the response"},
+                                           WrongAnswer{Mode::other_protocol, "the response is no Modbus"},
+                                           WrongAnswer{Mode::other_write, "confirms another address"}));
+
+TEST(ModbusDevices, AnExceptionThatNoStandardNamesIsShown) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, Mode::own_exception);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::exception); })) << sut.log();
+  EXPECT_EQ(plant.status(56).exception, ModbusPeer::kOwnException);
+  EXPECT_TRUE(eventually([&] { return sut.logged("refuses a request with exception 33"); })) << sut.log();
+}
+
+// It may have been switched off meanwhile, so it gets its outputs again.
+TEST(ModbusDevices, ADeviceThatEndsAConnectionAtRestIsNotLost) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, Mode::ends);
+  std::string text = device(port);
+  text.replace(text.find("poll_ms = 10"), 12, "poll_ms = 50");
+  const ModbusProgram sut(plant, plant.write(text + "rewrite_ms = 0\n"));
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
+  peer.with([](modbus_mapping_t& mapping) { mapping.tab_registers[7] = 0; });
+  EXPECT_TRUE(follows(plant, peer, 99)) << "unchanged, on another connection";
+  EXPECT_TRUE(quality_is(plant, 56, Quality::good));
+  EXPECT_FALSE(sut.logged("is lost")) << sut.log();
+}
+
 TEST(ModbusDevices, TheExceptionOfADeviceIsShown) {
   Plant plant;
   const HeldPort port;

@@ -147,6 +147,19 @@ bool ModbusPeer::serve(int fd) {
   return size >= 0 && answer(fd, request, size);
 }
 
+// Of a write as it is confirmed, or of a read of one register; with another byte at that place.
+bool ModbusPeer::answer_altered(int fd, Request& request, std::size_t at, std::uint8_t byte) {
+  std::size_t size = 12;
+  request[5] = 6;
+  if (request[7] == MODBUS_FC_READ_INPUT_REGISTERS) {
+    size = 11;
+    request[5] = 5;
+    request[8] = 2;
+  }
+  request[at] = byte;
+  return ::send(fd, request.data(), size, MSG_NOSIGNAL) > 0;
+}
+
 bool ModbusPeer::answer(int fd, Request& request, int size) {
   ++requests_;
   static constexpr std::array<char, 300> kGarbage{'g', 'a', 'r'};
@@ -169,6 +182,23 @@ bool ModbusPeer::answer(int fd, Request& request, int size) {
       return true;
     case Mode::refuses:
       return modbus_reply_exception(context_, request.data(), MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS) > 0;
+    case Mode::other_unit:
+      ++request[6];
+      break;
+    case Mode::other_length:
+      return answer_altered(fd, request, 5, 60);
+    case Mode::other_protocol:
+      return answer_altered(fd, request, 3, 1);
+    case Mode::other_write:
+      if (request[7] == MODBUS_FC_WRITE_MULTIPLE_REGISTERS) return answer_altered(fd, request, 9, 99);
+      break;
+    case Mode::own_exception:
+      request[5] = 3;
+      request[7] |= 0x80U;
+      request[8] = kOwnException;
+      return ::send(fd, request.data(), 9, MSG_NOSIGNAL) > 0;
+    case Mode::ends:
+      return modbus_reply(context_, request.data(), size, mapping_) < 0;
     case Mode::echoes:
     case Mode::normal:
       break;

@@ -45,13 +45,20 @@ class SerialLine {
 class ModbusPeer {
  public:
   static constexpr int kRegisters = 300;
+  static constexpr std::uint8_t kOwnException = 0x21;
   enum class Mode : int {
     normal,
-    stalls,    ///< takes requests, and does not answer
-    garbage,   ///< answers with bytes that are no Modbus
-    dribbles,  ///< answers one byte of a response after the other, and never ends
-    refuses,   ///< answers with exception 2
-    echoes,    ///< normal, and its input registers follow its holding registers
+    stalls,          ///< takes requests, and does not answer
+    garbage,         ///< answers with bytes that are no Modbus
+    dribbles,        ///< answers one byte of a response after the other, and never ends
+    refuses,         ///< answers with exception 2
+    other_unit,      ///< answers as another unit
+    other_length,    ///< says more bytes in the header than the function has
+    other_protocol,  ///< says in the header that it is no Modbus
+    other_write,     ///< confirms writes of another address
+    own_exception,   ///< answers with an exception that no standard names
+    ends,            ///< normal, and ends the connection behind each response
+    echoes,          ///< normal, and its input registers follow its holding registers
   };
 
   /// On TCP.
@@ -77,6 +84,7 @@ class ModbusPeer {
   using Request = std::array<std::uint8_t, MODBUS_TCP_MAX_ADU_LENGTH>;
   [[nodiscard]] bool serve(int fd);
   [[nodiscard]] bool answer(int fd, Request& request, int size);
+  [[nodiscard]] static bool answer_altered(int fd, Request& request, std::size_t at, std::uint8_t byte);
   void make_mapping();
 
   modbus_t* context_ = nullptr;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <string>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -115,6 +116,55 @@ TEST(ModbusProcess, AnImageHasOneWriter) {
   EXPECT_EQ(second.end(), 1);
   EXPECT_THAT(second.log(), HasSubstr("image 't.in' of pool"));
   EXPECT_THAT(second.log(), HasSubstr("another process writes it"));
+}
+
+// Without an input image nothing else would keep the second one off the devices.
+TEST(ModbusProcess, AFileHasOneProcess) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  std::string text = device(port);
+  text.erase(text.find("status_image"),
+             std::string_view("status_image = \"t.in\"\nstatus_offset = 56\n").size());
+  text.erase(text.find("[[device.read]]"), text.find("[[device.write]]") - text.find("[[device.read]]"));
+  const std::string config = plant.write(text);
+  ModbusProgram first(plant, config);
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  ModbusProgram second(plant, config, "second.log");
+  EXPECT_EQ(second.end(), 1);
+  EXPECT_THAT(second.log(), HasSubstr(config + ": another plchost-modbus runs with this file"));
+  EXPECT_TRUE(follows(plant, peer, 98));
+  EXPECT_EQ(first.end(SIGKILL), -SIGKILL);
+  const ModbusProgram third(plant, config, "third.log");
+  EXPECT_TRUE(follows(plant, peer, 97)) << third.log();
+}
+
+// By the status alone a PLC would take inputs for good whose firmware is gone.
+TEST(ModbusProcess, APlcSeesThatTheProcessIsGoneOrStandsStill) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); })) << sut.log();
+  for (int i = 0; i < 3; ++i) {
+    const auto counter = plant.status(56).counter;
+    EXPECT_TRUE(eventually([&] { return plant.status(56).counter != counter; }));
+  }
+  EXPECT_EQ(sut.end(SIGKILL), -SIGKILL);
+  const auto counter = plant.status(56).counter;
+  std::this_thread::sleep_for(200ms);
+  EXPECT_EQ(plant.status(56).counter, counter);
+}
+
+TEST(ModbusProcess, TheEndOfItsTerminalIsAnEndInOrder) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
+  plant.put_out(0, 99);
+  EXPECT_EQ(sut.end(SIGHUP), 0);
+  EXPECT_TRUE(becomes_zero(peer, 7));
 }
 
 TEST(ModbusProcess, AKilledProcessLeavesAnImageThatTheNextTakesOver) {

@@ -173,6 +173,19 @@ TEST(ModbusServer, WritesOnlyWhereItMay) {
   EXPECT_EQ(Client::exception(), -1);  // a function that is not served
 }
 
+// A client that has the answer may tell others to look.
+TEST(ModbusServer, AnAnsweredWriteIsInTheImage) {
+  Plant plant;
+  const HeldPort port;
+  const ModbusProgram sut(plant, plant.write(server(port)));
+  const Client client(port);
+  ASSERT_TRUE(client.connected()) << sut.log();
+  for (std::uint16_t value = 1; value <= 300; ++value) {
+    ASSERT_EQ(client.write(4, value), 0);
+    ASSERT_EQ(plant.input_word(16), value);
+  }
+}
+
 TEST(ModbusServer, GarbageEndsItsOwnConnectionOnly) {
   Plant plant;
   const HeldPort port;

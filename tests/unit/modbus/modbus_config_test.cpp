@@ -135,15 +135,16 @@ TEST(ModbusConfig, NamesBothLinesOfAnOverlap) {
   EXPECT_THAT(
       refused(device + std::string(kRead) +
               "[[device.read]]\nkind = \"coil\"\naddress = 9\nimage = \"t.in\"\noffset = 1\nbit = 7\n"),
-      HasSubstr("m.toml:16: overlaps with line 12: both have image 't.in' bits 15 to 15"));
+      HasSubstr("m.toml:16: offset: overlaps with line 12: both have image 't.in' bits 15 to 15"));
   // The status and a map.
   EXPECT_THAT(refused(device + "status_image = \"t.in\"\nstatus_offset = 0\n" + std::string(kRead)),
-              HasSubstr("m.toml:14: overlaps with line 9: both have image 't.in' bits 0 to 15"));
+              HasSubstr("m.toml:14: offset: overlaps with line 9: both have image 't.in' bits 0 to 15"));
   // Two maps write one coil of a device.
   const std::string write = "[[device.write]]\nkind = \"coil\"\naddress = 4\ncount = 4\nimage = \"t.out\"\n";
   EXPECT_THAT(
       refused(device + write + write),
-      HasSubstr("m.toml:17: overlaps with line 12: both have coil of device 'valves' addresses 4 to 7"));
+      HasSubstr(
+          "m.toml:17: address: overlaps with line 12: both have coil of device 'valves' addresses 4 to 7"));
   // A client of the server and a device write one place.
   const std::string served = "kind = \"holding_register\"\naddress = 0\nimage = \"t.in\"\n";
   EXPECT_THAT(
@@ -173,8 +174,26 @@ TEST(ModbusConfig, RefusesTheSameDeviceOrNameTwice) {
   const std::string other =
       "[[device]]\nname = \"other\"\ntcp = \"127.0.0.1:1502\"\n[[device.read]]\n"
       "kind = \"coil\"\naddress = 0\nimage = \"t.in\"\noffset = 4\n";
-  EXPECT_THAT(refused(device + other), HasSubstr("127.0.0.1:1502 unit 1 is the device of line 9"));
+  EXPECT_THAT(refused(device + other),
+              HasSubstr("[[device]] 'other' unit: 127.0.0.1:1502 unit 1 is the device of line 9"));
   EXPECT_THAT(refused(std::string(kImages)), HasSubstr("name: is taken already in line 1"));
+}
+
+TEST(ModbusConfig, KnowsADeviceByEachSpellingOfItsAddress) {
+  const auto device = [](std::string_view name, std::string_view way, int offset) {
+    return fmt::format(
+        "[[device]]\nname = \"{}\"\n{}\n[[device.read]]\n"
+        "kind = \"coil\"\naddress = 0\nimage = \"t.in\"\noffset = {}\n",
+        name, way, offset);
+  };
+  for (const auto& [one, other] : std::vector<std::pair<const char*, const char*>>{
+           {"tcp = \"127.0.0.1\"", "tcp = \"127.0.0.1:502\""},
+           {"tcp = \"[::1]:502\"", "tcp = \"[0:0::1]\""},
+           {"serial = \"/dev/ttyS9\"", "serial = \"/dev//./ttyS9\""}}) {
+    EXPECT_THAT(refused(device("one", one, 0) + device("other", other, 4)),
+                HasSubstr("unit 1 is the device of line 9"))
+        << other;
+  }
 }
 
 TEST(ModbusConfig, TheDevicesOfOneLineHaveOneSpeed) {
@@ -200,7 +219,7 @@ TEST(ModbusConfig, HasBounds) {
     return text;
   };
   EXPECT_EQ(refused(devices(kMaxDevices)), "accepted");
-  EXPECT_THAT(refused(devices(kMaxDevices + 1)), HasSubstr("65 [[device]]; allowed are up to 64"));
+  EXPECT_THAT(refused(devices(kMaxDevices + 1)), HasSubstr("257 [[device]]; allowed are up to 256"));
   const auto maps = [](std::size_t count) {
     std::string text(kDevice);
     for (std::size_t i = 0; i < count; ++i) {

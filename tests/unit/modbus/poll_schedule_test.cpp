@@ -35,6 +35,21 @@ TEST(PollSchedule, PausesLongerWithEachFailureUpToItsBound) {
   EXPECT_EQ(sut.next(), now + 700ms);
 }
 
+TEST(PollSchedule, APauseThatIsShorterThanTheIntervalIsKept) {
+  PollSchedule sut(10s, 500ms, 2s, kStart);
+  sut.failed(kStart + 200ms);
+  EXPECT_EQ(sut.next(), kStart + 700ms);
+  sut.failed(kStart + 900ms);
+  EXPECT_EQ(sut.next(), kStart + 1900ms);
+  sut.answered(kStart + 1950ms);
+  EXPECT_EQ(sut.next(), kStart + 10s) << "back on the grid";
+  EXPECT_EQ(sut.skipped(), 0);
+  sut.failed(kStart + 19'800ms);
+  EXPECT_EQ(sut.next(), kStart + 20'300ms);
+  sut.answered(kStart + 20'400ms);
+  EXPECT_EQ(sut.next(), kStart + 30s);
+}
+
 TEST(DeviceState, TellsQualityAndAge) {
   DeviceState sut;
   EXPECT_EQ(sut.status(kStart).age_ms, kNeverRead);
@@ -53,6 +68,9 @@ TEST(DeviceState, TellsQualityAndAge) {
   EXPECT_EQ(sut.status(kStart + 10'000h).age_ms, kNeverRead - 1);
   sut.polled(Quality::good, 0);
   EXPECT_EQ(sut.status(kStart).exception, 0);
+  const auto counter = sut.status(kStart).counter;
+  sut.count();
+  EXPECT_NE(sut.status(kStart).counter, counter);
 }
 
 TEST(ModbusEndpoint, IsNumeric) {

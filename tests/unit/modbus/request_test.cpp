@@ -37,6 +37,7 @@ TEST(ModbusRequest, GarbageIsSeenAtOnce) {
   EXPECT_EQ(first_frame(std::vector<std::uint8_t>{0, 1, 0, 0, 0, 1}).state, FrameState::garbage);
   EXPECT_EQ(first_frame(std::vector<std::uint8_t>{0, 1, 0, 0, 0, 255}).state, FrameState::garbage);
   EXPECT_EQ(first_frame(std::vector<std::uint8_t>{0, 1, 0, 0, 0, 254}).state, FrameState::incomplete);
+  EXPECT_EQ(first_frame(frame({0x83, 2})).state, FrameState::garbage) << "no request, but an exception";
 }
 
 TEST(ModbusRequest, IsReadWhole) {
@@ -51,6 +52,28 @@ TEST(ModbusRequest, IsReadWhole) {
   EXPECT_EQ(written->kind, RegisterKind::coil);
   EXPECT_TRUE(written->writes);
   EXPECT_EQ(written->count, 9);
+}
+
+TEST(ModbusRequest, WritesWhatItSays) {
+  const auto words = [](const std::vector<std::uint8_t>& pdu) {
+    MapValues values;
+    const auto request = parse_request(frame(pdu));
+    take_written(frame(pdu), *request, values);
+    const auto taken = values.registers(request->count);
+    return std::vector<int>(taken.begin(), taken.end());
+  };
+  const auto bits = [](const std::vector<std::uint8_t>& pdu) {
+    MapValues values;
+    const auto request = parse_request(frame(pdu));
+    take_written(frame(pdu), *request, values);
+    const auto taken = values.bits(request->count);
+    return std::vector<int>(taken.begin(), taken.end());
+  };
+  EXPECT_EQ(words({6, 0, 0, 0x12, 0x34}), std::vector{0x1234});
+  EXPECT_EQ(words({16, 0, 0, 0, 2, 4, 0xff, 0xfe, 0, 1}), (std::vector{0xfffe, 1}));
+  EXPECT_EQ(bits({5, 0, 0, 0xff, 0}), std::vector{1});
+  EXPECT_EQ(bits({5, 0, 0, 0, 0}), std::vector{0});
+  EXPECT_EQ(bits({15, 0, 0, 0, 9, 2, 0x81, 0xff}), (std::vector{1, 0, 0, 0, 0, 0, 0, 1, 1}));
 }
 
 TEST(ModbusRequest, IsRefusedWithTheExceptionOfTheProtocol) {

@@ -35,8 +35,8 @@ Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images,
 void Device::run() {
   PollSchedule schedule(config_.poll, config_.reconnect, config_.reconnect_max, MonotonicClock::now());
   while (!stop_.wait_until(schedule.next())) {
-    poll();
-    if (quality_ == Quality::lost) {
+    const bool asked = poll();
+    if (asked && quality_ == Quality::lost) {
       schedule.failed(MonotonicClock::now());
     } else {
       schedule.answered(MonotonicClock::now());
@@ -49,13 +49,14 @@ void Device::run() {
   }
 }
 
-void Device::poll() {
+bool Device::poll() {
   asked_ = !inputs_.empty();
   const LinkResult written = write_outputs();
-  if (!asked_) return;  // nothing was due, so nothing is known
+  if (!asked_) return false;  // nothing was due, so nothing is known
   const bool is_there = written || written.error().exception != 0;
   const LinkResult read = is_there ? read_inputs() : written;
   end_poll(written, read);
+  return true;
 }
 
 // A refused map does not keep the others from being written.
@@ -74,12 +75,14 @@ LinkResult Device::write_output(Output& output) {
   MapValues values;
   const bool wanted = outputs_of(output, values);
   const TimePoint now = MonotonicClock::now();
-  const bool due = !output.is_written || values != output.written ||
+  const bool due = !output.is_written || output.connection != link_.connection() ||
+                   values != output.written ||
                    (output.map->rewrite > Duration::zero() && now - output.written_at >= output.map->rewrite);
   if (!wanted || !due) return {};
   asked_ = true;
   auto result = link_.write(config_, *output.map, values);
   output.is_written = result.has_value();
+  output.connection = link_.connection();
   output.written = values;
   output.written_at = now;
   return result;
@@ -130,7 +133,7 @@ void Device::publish_inputs() {
 
 void Device::end_poll(const LinkResult& written, const LinkResult& read) {
   const LinkFailure* const failure = !read ? &read.error() : !written ? &written.error() : nullptr;
-  const std::uint16_t exception = failure == nullptr ? std::uint16_t{0} : failure->exception;
+  const std::uint8_t exception = failure == nullptr ? std::uint8_t{0} : failure->exception;
   quality_ = failure == nullptr ? Quality::good : exception != 0 ? Quality::exception : Quality::lost;
   if (quality_ == Quality::lost) {
     for (Output& output : outputs_) output.is_written = false;
@@ -141,7 +144,7 @@ void Device::end_poll(const LinkResult& written, const LinkResult& read) {
     publish_inputs();
   }
   state_.polled(quality_, exception);  // behind the inputs: none is shown as good that has not come
-  if (read && status_image_ != nullptr)
+  if (status_image_ != nullptr)
     status_image_->update([&](std::span<std::byte> bytes) { show(*status_image_, bytes, now); });
   report(failure);
 }
@@ -184,9 +187,7 @@ void Device::show(const InputImage& image, std::span<std::byte> bytes, TimePoint
     }
   }
   if (status_image_ != &image) return;
-  DeviceStatus status = state_.status(now);
-  if (ended)
-    status = {.quality = static_cast<std::uint16_t>(Quality::none), .exception = 0, .age_ms = kNeverRead};
+  const DeviceStatus status = ended ? DeviceStatus{.age_ms = kNeverRead} : state_.status(now);
   std::memcpy(bytes.data() + config_.status_offset, &status, sizeof status);
 }
 

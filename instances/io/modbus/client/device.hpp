@@ -28,11 +28,13 @@ class Device {
   [[nodiscard]] const std::string& name() const noexcept { return config_.name; }
   /// Its thread: polls until the stop, then puts the outputs into their safe state.
   void run();
-  /// One poll; run() does it. The thread of run() only, or no thread runs.
-  void poll();
+  /// One poll; run() does it. False: there was nothing to ask. The thread of run() only, or no thread runs.
+  bool poll();
   /// Of the last poll.
   [[nodiscard]] Quality quality() const noexcept { return quality_; }
 
+  /// This process runs: another value of the counter in the status. Any thread.
+  void count() { state_.count(); }
   /// Puts the status into the bytes of an image, and zeros for inputs that are too old if so configured. Any
   /// thread, within the update of that image. `ended`: the device is polled no more.
   void show(const InputImage& image, std::span<std::byte> bytes, TimePoint now, bool ended = false) const;
@@ -47,7 +49,8 @@ class Device {
     const RegisterMap* map;
     OutputImage* image;
     MapValues written;
-    bool is_written = false;  ///< since the connection was made
+    bool is_written = false;
+    std::uint64_t connection = 0;  ///< on which it was written
     TimePoint written_at;
     bool is_silent = true;          ///< its PLC; at first nothing was put out
     std::uint64_t silent_with = 0;  ///< the image that was shown then

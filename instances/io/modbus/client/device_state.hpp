@@ -19,16 +19,23 @@ class DeviceState {
     read_at_ = now;
   }
   /// The end of a poll. `exception`: of a refused request; 0: none.
-  void polled(Quality quality, std::uint16_t exception) {
+  void polled(Quality quality, std::uint8_t exception) {
     const std::lock_guard lock(mutex_);
     quality_ = quality;
     if (exception != 0 || quality == Quality::good) exception_ = exception;
+  }
+
+  /// This process runs.
+  void count() {
+    const std::lock_guard lock(mutex_);
+    ++counter_;
   }
 
   [[nodiscard]] DeviceStatus status(TimePoint now) const {
     const std::lock_guard lock(mutex_);
     return {.quality = static_cast<std::uint16_t>(quality_),
             .exception = exception_,
+            .counter = counter_,
             .age_ms = read_at_ ? in_ms(now - *read_at_) : kNeverRead};
   }
   /// The inputs are older than that, or were never read.
@@ -45,7 +52,8 @@ class DeviceState {
 
   mutable std::mutex mutex_;
   Quality quality_ = Quality::none;
-  std::uint16_t exception_ = 0;
+  std::uint8_t exception_ = 0;
+  std::uint8_t counter_ = 0;
   std::optional<TimePoint> read_at_;
 };
 

@@ -1,139 +1,150 @@
 #include "instances/io/modbus/client/link.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/select.h>
 #include <sys/socket.h>
 
 #include "instances/io/modbus/client/tcp_connect.hpp"
+#include "instances/io/modbus/client/tcp_exchange.hpp"
 #include "instances/io/modbus/config/endpoint.hpp"
 
 namespace plchost::modbus {
 
 namespace {
 
+using Failure = std::unexpected<std::string>;
+
 constexpr int kDataBits = 8;  // of RTU
 constexpr std::array kParityLetters = {'N', 'E', 'O'};
-
-modbus_t* context_of(const DeviceConfig& device) {
-  // The connection of TCP is made here, so that it ends with the stop: the address is never used.
-  if (device.serial.empty()) return modbus_new_tcp("127.0.0.1", kModbusPort);
-  return modbus_new_rtu(device.serial.c_str(), device.baud, kParityLetters[std::to_underlying(device.parity)],
-                        kDataBits, device.stop_bits);
-}
-
-std::uint16_t exception_of(int error) noexcept {
-  const int code = error - MODBUS_ENOBASE;
-  return code >= MODBUS_EXCEPTION_ILLEGAL_FUNCTION && code <= MODBUS_EXCEPTION_GATEWAY_TARGET
-             ? static_cast<std::uint16_t>(code)
-             : std::uint16_t{0};
-}
-
-LinkResult failed(std::string text) {
-  return std::unexpected(LinkFailure{.exception = 0, .text = std::move(text)});
-}
 
 }  // namespace
 
 Result<std::unique_ptr<Link>> Link::make(const DeviceConfig& device, const StopEvent& stop) {
-  modbus_t* const context = context_of(device);
-  if (context == nullptr) {
+  if (device.serial.empty()) return std::unique_ptr<Link>(new Link(nullptr, stop));
+  modbus_t* const line =
+      modbus_new_rtu(device.serial.c_str(), device.baud, kParityLetters[std::to_underlying(device.parity)],
+                     kDataBits, device.stop_bits);
+  if (line == nullptr) {
     return failure(ErrorCode::system, fmt::format("libmodbus refuses device '{}'", device.name), errno);
   }
-  std::unique_ptr<Link> link(new Link(context, stop));
   // The response timeout is then that of the whole response: a device that sends single bytes with pauses has
   // no more time.
-  modbus_set_byte_timeout(context, 0, 0);
-  return link;
+  modbus_set_byte_timeout(line, 0, 0);
+  return std::unique_ptr<Link>(new Link(line, stop));
 }
 
 Link::~Link() {
-  close();
+  close_line();
 }
 
-void Link::keep_descriptor(int fd) noexcept {
+void Link::close_line() noexcept {
+  if (std::exchange(line_is_open_, false)) modbus_close(line_.get());
+}
+
+void Link::keep(UniqueFd connection) noexcept {
   const std::lock_guard lock(descriptor_);
-  fd_ = fd;
+  tcp_ = std::move(connection);
 }
 
 void Link::interrupt() noexcept {
   const std::lock_guard lock(descriptor_);
-  if (fd_ >= 0) ::shutdown(fd_, SHUT_RDWR);
+  if (tcp_) ::shutdown(tcp_.get(), SHUT_RDWR);
 }
 
-void Link::close() noexcept {
-  keep_descriptor(-1);
-  if (std::exchange(is_open_, false)) modbus_close(context_.get());
-}
-
-LinkResult Link::open(const DeviceConfig& device, Limits limits) {
-  if (is_open_) return {};
-  if (stop_.is_set() && !limits.at_end) return failed("this process ends");
-  auto opened = device.serial.empty() ? open_tcp(device, limits) : open_serial(device);
-  is_open_ = opened.has_value();
-  return opened;
-}
-
-LinkResult Link::open_tcp(const DeviceConfig& device, Limits limits) {
+std::expected<void, std::string> Link::open_tcp(const DeviceConfig& device, Limits limits) {
+  // Many devices end a connection that rests. That is no failure: the next one is made at once.
+  if (tcp_ && is_usable(tcp_.get())) return {};
+  keep(UniqueFd());
+  if (stop_.is_set() && !limits.at_end) return Failure("this process ends");
   const auto endpoint = parse_endpoint(device.tcp);
-  if (!endpoint) return failed(endpoint.error());
+  if (!endpoint) return Failure(endpoint.error());
   auto fd = tcp_connect(*endpoint, MonotonicClock::now() + limits.timeout, limits.at_end ? nullptr : &stop_);
-  if (!fd) return failed(fd.error().describe());
-  keep_descriptor(fd->get());
-  modbus_set_socket(context_.get(), fd->release());
+  if (!fd) return Failure(fd.error().describe());
+  keep(std::move(*fd));
+  ++connection_;
   return {};
 }
 
-LinkResult Link::open_serial(const DeviceConfig& device) {
-  if (modbus_connect(context_.get()) != 0) {
-    return failed(fmt::format("{}: {}", device.serial, modbus_strerror(errno)));
+std::expected<Pdu, std::string> Link::ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked) {
+  // A device may end a connection at rest while it is asked. Then it is asked once more: a request that is
+  // carried out twice does no more.
+  for (bool again = static_cast<bool>(tcp_);; again = false) {
+    if (auto opened = open_tcp(device, limits); !opened) return Failure(std::move(opened).error());
+    auto answer =
+        exchange_tcp(tcp_.get(), ++number_, device.unit, asked, MonotonicClock::now() + limits.timeout);
+    if (answer) return *answer;
+    keep(UniqueFd());
+    if (!again || !answer.error().at_rest) return Failure(std::move(answer).error().text);
   }
-  if (modbus_get_socket(context_.get()) < FD_SETSIZE) return {};
-  modbus_close(context_.get());
-  return failed("too many open files for libmodbus");
 }
 
-template <class Call>
-LinkResult Link::request(const DeviceConfig& device, Limits limits, const Call& call) {
-  const std::lock_guard lock(turn_);
-  if (auto opened = open(device, limits); !opened) return opened;
-  modbus_t* const context = context_.get();
-  modbus_set_slave(context, device.unit);
+std::expected<void, std::string> Link::open_line(const DeviceConfig& device) {
+  if (line_is_open_) return {};
+  if (modbus_connect(line_.get()) != 0) {
+    return Failure(fmt::format("{}: {}", device.serial, modbus_strerror(errno)));
+  }
+  const int fd = modbus_get_socket(line_.get());
+  const bool alone = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
+  if (fd < FD_SETSIZE && alone) {
+    line_is_open_ = true;
+    ++connection_;
+    return {};
+  }
+  modbus_close(line_.get());
+  return Failure(alone ? "too many open files for libmodbus"
+                       : fmt::format("{}: another process uses this line", device.serial));
+}
+
+std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
+  if (stop_.is_set() && !limits.at_end && !line_is_open_) return Failure("this process ends");
+  if (auto opened = open_line(device); !opened) return Failure(std::move(opened).error());
+  modbus_t* const line = line_.get();
+  modbus_set_slave(line, device.unit);
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(limits.timeout).count();
   constexpr std::int64_t kSecond = 1'000'000;
-  modbus_set_response_timeout(context, static_cast<std::uint32_t>(us / kSecond),
+  modbus_set_response_timeout(line, static_cast<std::uint32_t>(us / kSecond),
                               static_cast<std::uint32_t>(us % kSecond));
-  if (!device.serial.empty()) modbus_flush(context);  // a late response of somebody else
-  if (call(context) >= 0) return {};
-  const int error = errno;
-  if (const std::uint16_t exception = exception_of(error); exception != 0) {
-    return std::unexpected(LinkFailure{.exception = exception, .text = modbus_strerror(error)});
+  modbus_flush(line);  // a late response of somebody else
+  std::array<std::uint8_t, kMaxPdu + 1> raw{};
+  raw[0] = device.unit;
+  std::ranges::copy(asked.view(), raw.begin() + 1);
+  std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> received{};
+  const bool sent = modbus_send_raw_request(line, raw.data(), static_cast<int>(asked.size) + 1) > 0;
+  const int size = sent ? modbus_receive_confirmation(line, received.data()) : -1;
+  if (size < 0) {
+    // The line stays open for its other devices while they can use it.
+    const int error = errno;
+    if (error != ETIMEDOUT && error <= MODBUS_ENOBASE) close_line();
+    return Failure(modbus_strerror(error));
   }
-  // A serial line stays open for its other devices while they can use it.
-  const bool line_is_fine = error == ETIMEDOUT || error > MODBUS_ENOBASE;
-  if (device.serial.empty() || !line_is_fine) close();
-  return failed(modbus_strerror(error));
+  constexpr int kAround = 3;  // unit and checksum, which libmodbus has compared
+  if (size <= kAround || received[0] != device.unit)
+    return Failure(fmt::format("the response is not of unit {}", device.unit));
+  Pdu response;
+  response.size = static_cast<std::size_t>(size - kAround);
+  std::copy_n(received.begin() + 1, response.size, response.bytes.begin());
+  return response;
+}
+
+LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take) {
+  const std::lock_guard lock(turn_);
+  const auto response = line_ ? ask_line(device, limits, asked) : ask_tcp(device, limits, asked);
+  auto result = response ? take(response->view())
+                         : std::unexpected(LinkFailure{.exception = 0, .text = response.error()});
+  if (!result && result.error().exception == 0) keep(UniqueFd());
+  return result;
 }
 
 LinkResult Link::read(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {
-  const int count = static_cast<int>(map.count);
-  return request(device, {.timeout = device.timeout}, [&](modbus_t* context) {
-    switch (map.kind) {
-      case RegisterKind::coil:
-        return modbus_read_bits(context, map.address, count, values.bits(map.count).data());
-      case RegisterKind::discrete_input:
-        return modbus_read_input_bits(context, map.address, count, values.bits(map.count).data());
-      case RegisterKind::holding_register:
-        return modbus_read_registers(context, map.address, count, values.registers(map.count).data());
-      case RegisterKind::input_register:
-        break;
-    }
-    return modbus_read_input_registers(context, map.address, count, values.registers(map.count).data());
-  });
+  return request(device, {.timeout = device.timeout}, read_request(map),
+                 [&](std::span<const std::uint8_t> response) { return take_values(map, response, values); });
 }
 
 LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {
@@ -145,19 +156,10 @@ LinkResult Link::write_at_end(const DeviceConfig& device, const RegisterMap& map
   return write(device, map, values, {.timeout = timeout, .at_end = true});
 }
 
-// Many devices have only the functions for one register, others only those for several.
 LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits) {
-  const int count = static_cast<int>(map.count);
-  return request(device, limits, [&](modbus_t* context) {
-    if (is_bit(map.kind)) {
-      const auto bits = values.bits(map.count);
-      return count == 1 ? modbus_write_bit(context, map.address, bits[0])
-                        : modbus_write_bits(context, map.address, count, bits.data());
-    }
-    const auto registers = values.registers(map.count);
-    return count == 1 ? modbus_write_register(context, map.address, registers[0])
-                      : modbus_write_registers(context, map.address, count, registers.data());
-  });
+  const Pdu asked = write_request(map, values);
+  return request(device, limits, asked,
+                 [&](std::span<const std::uint8_t> response) { return check_written(asked, response); });
 }
 
 }  // namespace plchost::modbus

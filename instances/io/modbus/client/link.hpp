@@ -1,26 +1,24 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <expected>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 
 #include <modbus/modbus.h>
 
+#include "instances/io/modbus/client/pdu.hpp"
 #include "instances/io/modbus/config/map_values.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 #include "instances/io/modbus/threads/stop_event.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/unique_fd.hpp"
 
 namespace plchost::modbus {
-
-/// A request that was not answered as it should be.
-struct LinkFailure {
-  std::uint16_t exception = 0;  ///< the code of the device; 0: no answer, or garbage
-  std::string text;
-};
-using LinkResult = std::expected<void, LinkFailure>;
 
 /// The way to one device on TCP, or to all devices of one serial line, which take turns for each request. It
 /// connects by itself. A TCP connection is closed after each failure that is no exception, so that no late
@@ -40,6 +38,9 @@ class Link {
   /// the stop.
   [[nodiscard]] LinkResult write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
                                         Duration timeout);
+  /// The number of the connection or of the opening of the line. The device may have forgotten earlier
+  /// writes.
+  [[nodiscard]] std::uint64_t connection() const noexcept { return connection_; }
 
   /// A thread that waits for a response on TCP gets none any more.
   void interrupt() noexcept;
@@ -48,27 +49,30 @@ class Link {
   struct Free {
     void operator()(modbus_t* context) const noexcept { modbus_free(context); }
   };
-  Link(modbus_t* context, const StopEvent& stop) : context_(context), stop_(stop) {}
+  Link(modbus_t* line, const StopEvent& stop) : line_(line), stop_(stop) {}
 
   struct Limits {
     Duration timeout;
     bool at_end = false;
   };
-  template <class Call>
-  LinkResult request(const DeviceConfig& device, Limits limits, const Call& call);
+  using Take = std::function<LinkResult(std::span<const std::uint8_t> response)>;
+  LinkResult request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take);
   LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
-  LinkResult open(const DeviceConfig& device, Limits limits);
-  LinkResult open_tcp(const DeviceConfig& device, Limits limits);
-  LinkResult open_serial(const DeviceConfig& device);
-  void close() noexcept;
-  void keep_descriptor(int fd) noexcept;
+  std::expected<Pdu, std::string> ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked);
+  std::expected<Pdu, std::string> ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked);
+  std::expected<void, std::string> open_tcp(const DeviceConfig& device, Limits limits);
+  std::expected<void, std::string> open_line(const DeviceConfig& device);
+  void close_line() noexcept;
+  void keep(UniqueFd connection) noexcept;
 
-  std::unique_ptr<modbus_t, Free> context_;
+  std::unique_ptr<modbus_t, Free> line_;  ///< null: TCP
   const StopEvent& stop_;
-  std::mutex turn_;        ///< held for one request
-  bool is_open_ = false;   ///< under turn_
-  std::mutex descriptor_;  ///< of fd_, and never held while waiting
-  int fd_ = -1;            ///< of a TCP connection
+  std::mutex turn_;  ///< held for one request, and for what follows
+  bool line_is_open_ = false;
+  std::uint16_t number_ = 0;  ///< of the last request on TCP
+  std::atomic<std::uint64_t> connection_{0};
+  std::mutex descriptor_;  ///< for changes of tcp_ beside turn_, and never held while waiting
+  UniqueFd tcp_;
 };
 
 }  // namespace plchost::modbus

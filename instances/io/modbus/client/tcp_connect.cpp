@@ -6,7 +6,6 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <sys/select.h>
 #include <sys/socket.h>
 
 #include "shm/base/system_call.hpp"
@@ -30,7 +29,6 @@ bool is_with_itself(int fd) noexcept {
 Result<UniqueFd> tcp_connect(const Endpoint& endpoint, TimePoint deadline, const StopEvent* stop) {
   UniqueFd fd(::socket(endpoint.family(), SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP));
   if (!fd) return failure(ErrorCode::system, "socket", errno);
-  if (fd.get() >= FD_SETSIZE) return failure(ErrorCode::full, "too many open files for libmodbus");
   const int one = 1;
   PLCHOST_TRY(check_errno(::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &one, sizeof one), "TCP_NODELAY"));
   const int connected =

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/io/modbus/config/endpoint.hpp"
 #include "instances/io/modbus/config/modbus_keys.hpp"
 #include "shm/base/names.hpp"
 
@@ -23,12 +24,13 @@ struct Claim {
   std::uint64_t begin;
   std::uint64_t end;
   unsigned line;
+  std::string_view key;  ///< says where it begins
 };
 
 class Claims {
  public:
-  void add(std::string space, std::uint64_t begin, std::uint64_t size, unsigned line) {
-    claims_[std::move(space)].push_back({.begin = begin, .end = begin + size, .line = line});
+  void add(std::string space, std::string_view key, std::uint64_t begin, std::uint64_t size, unsigned line) {
+    claims_[std::move(space)].push_back({.begin = begin, .end = begin + size, .line = line, .key = key});
   }
   /// `what`: of the problem, behind the lines.
   void check(std::vector<ConfigProblem>& problems, std::string_view what) {
@@ -46,12 +48,14 @@ class Claims {
  private:
   static void report(std::vector<ConfigProblem>& problems, const Claim& one, const Claim& other,
                      const std::string& space, std::string_view what) {
-    const auto [first, second] = std::minmax(one.line, other.line);
-    problems.push_back({.line = second,
-                        .text = fmt::format("overlaps with line {}: both have {} {} {} to {}; give each its "
-                                            "own",
-                                            first, space, what, std::max(one.begin, other.begin),
-                                            std::min(one.end, other.end) - 1)});
+    const auto& [first, second] =
+        std::minmax(one, other, [](const Claim& a, const Claim& b) { return a.line < b.line; });
+    problems.push_back(
+        {.line = second.line,
+         .text = fmt::format("{}: overlaps with line {}: both have {} {} {} to {}; give each "
+                             "its own",
+                             second.key, first.line, space, what, std::max(one.begin, other.begin),
+                             std::min(one.end, other.end) - 1)});
   }
 
   std::map<std::string, std::vector<Claim>> claims_;
@@ -79,13 +83,14 @@ void check_places(const ModbusConfig& config, std::vector<ConfigProblem>& proble
   Claims images;
   constexpr std::uint64_t kStatusBits = sizeof(DeviceStatus) * 8;
   const auto fill = [&](const RegisterMap& map) {
-    images.add(fmt::format("image '{}'", shown(map.image)), first_bit(map), size_in_bits(map), map.line);
+    images.add(fmt::format("image '{}'", shown(map.image)), "offset", first_bit(map), size_in_bits(map),
+               map.line);
   };
   for (const DeviceConfig& device : config.devices) {
     for (const RegisterMap& map : device.reads) fill(map);
     if (device.status_image.empty()) continue;
-    images.add(fmt::format("image '{}'", shown(device.status_image)), std::uint64_t{device.status_offset} * 8,
-               kStatusBits, device.line);
+    images.add(fmt::format("image '{}'", shown(device.status_image)), "status_offset",
+               std::uint64_t{device.status_offset} * 8, kStatusBits, device.line);
   }
   if (config.server) {
     for (const RegisterMap& map : config.server->maps) {
@@ -99,31 +104,39 @@ void check_registers(const ModbusConfig& config, std::vector<ConfigProblem>& pro
   Claims written;
   for (const DeviceConfig& device : config.devices) {
     for (const RegisterMap& map : device.writes) {
-      written.add(fmt::format("{} of device '{}'", kind_name(map), shown(device.name)), map.address,
-                  map.count, map.line);
+      written.add(fmt::format("{} of device '{}'", kind_name(map), shown(device.name)), "address",
+                  map.address, map.count, map.line);
     }
   }
   written.check(problems, "addresses");
   if (!config.server) return;
   Claims served;
   for (const RegisterMap& map : config.server->maps)
-    served.add(kind_name(map), map.address, map.count, map.line);
+    served.add(kind_name(map), "address", map.address, map.count, map.line);
   served.check(problems, "addresses");
 }
 
+// One text for each address, however it is written.
+std::string address_of(const DeviceConfig& device) {
+  const auto endpoint = parse_endpoint(device.tcp);
+  if (device.tcp.empty() || !endpoint) return device.serial + device.tcp;
+  return {reinterpret_cast<const char*>(&endpoint->address), endpoint->size};
+}
+
 void check_device_addresses(const std::vector<DeviceConfig>& devices, std::vector<ConfigProblem>& problems) {
-  std::map<std::pair<std::string_view, int>, unsigned> units;
+  std::map<std::pair<std::string, int>, unsigned> units;
   std::map<std::string_view, const DeviceConfig*> serial_lines;
   for (const DeviceConfig& device : devices) {
     const std::string_view place = device.tcp.empty() ? device.serial : device.tcp;
     if (place.empty()) continue;  // reported where it was read
-    const auto [known, added] = units.emplace(std::pair{place, int{device.unit}}, device.line);
+    const auto [known, added] = units.emplace(std::pair{address_of(device), int{device.unit}}, device.line);
     if (!added) {
-      problems.push_back({.line = device.line,
-                          .text = fmt::format(
-                              "[[device]] '{}': {} unit {} is the device of line {}; give all maps to one of "
-                              "both",
-                              shown(device.name), shown(place), int{device.unit}, known->second)});
+      problems.push_back(
+          {.line = device.line,
+           .text = fmt::format(
+               "[[device]] '{}' unit: {} unit {} is the device of line {}; give all maps to one of "
+               "both",
+               shown(device.name), shown(place), int{device.unit}, known->second)});
     }
     if (device.serial.empty()) continue;
     const DeviceConfig& first = *serial_lines.emplace(device.serial, &device).first->second;
@@ -131,10 +144,11 @@ void check_device_addresses(const std::vector<DeviceConfig>& devices, std::vecto
         std::tie(device.baud, device.parity, device.stop_bits)) {
       continue;
     }
-    problems.push_back({.line = device.line,
-                        .text = fmt::format("[[device]] '{}': {} has another baud, parity or stop_bits in "
-                                            "line {}; all devices of one line have the same",
-                                            shown(device.name), shown(device.serial), first.line)});
+    problems.push_back(
+        {.line = device.line,
+         .text = fmt::format("[[device]] '{}' baud: {} has another baud, parity or stop_bits in "
+                             "line {}; all devices of one line have the same",
+                             shown(device.name), shown(device.serial), first.line)});
   }
 }
 

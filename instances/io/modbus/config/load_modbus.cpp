@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <utility>
 #include <variant>
@@ -128,6 +129,8 @@ class Loader {
     reader.know("read");
     reader.know("write");
     read_keys(device_keys(), ModbusReading{}, reader, device);
+    // One name for each line: devices of one line take turns.
+    device.serial = std::filesystem::path(device.serial).lexically_normal().string();
     check_way(reader, device);
     check_device(reader, device);
     read_maps(table, "read", where + " [[device.read]]", MapUse::device_read, device.reads);

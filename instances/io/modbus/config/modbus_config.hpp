@@ -108,7 +108,7 @@ struct ModbusConfig {
 // Bounds of what a file may say.
 inline constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 20;
 inline constexpr std::size_t kMaxImages = 32;
-inline constexpr std::size_t kMaxDevices = 64;
+inline constexpr std::size_t kMaxDevices = 256;
 inline constexpr std::size_t kMaxMaps = 64;  ///< of a device in one direction, and of the server
 inline constexpr std::int64_t kMaxServerConnections = 64;
 inline constexpr std::uint32_t kRegisterSpace = 65'536;  ///< addresses of each kind
@@ -120,9 +120,10 @@ inline constexpr std::uint32_t kMaxWriteRegisters = 123;
 
 /// The status of a device in an input image. The PLC sees this struct at `status_offset`.
 struct DeviceStatus {
-  std::uint16_t quality = 0;    ///< Quality
-  std::uint16_t exception = 0;  ///< the last exception code of the device; 0: none
-  std::uint32_t age_ms = 0;     ///< since the inputs were last read whole; kNeverRead: not yet
+  std::uint16_t quality = 0;   ///< Quality
+  std::uint8_t exception = 0;  ///< the last exception code of the device; 0: none
+  std::uint8_t counter = 0;    ///< another one every 50 ms, as long as plchost-modbus runs
+  std::uint32_t age_ms = 0;    ///< since the inputs were last read whole; kNeverRead: not yet
 };
 static_assert(sizeof(DeviceStatus) == 8);
 inline constexpr std::uint32_t kNeverRead = 0xffff'ffff;

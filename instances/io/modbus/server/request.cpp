@@ -39,8 +39,9 @@ constexpr std::array kFunctions = {
     Function{MODBUS_FC_WRITE_MULTIPLE_REGISTERS, RegisterKind::holding_register, true, kMaxWriteRegisters},
 };
 
-constexpr std::size_t kPlainSize = 5;  // function, address, count or value
-constexpr std::uint16_t kOn = 0xff00;  // the value of a single coil
+constexpr std::uint8_t kException = 0x80;  // in the function of a response
+constexpr std::size_t kPlainSize = 5;      // function, address, count or value
+constexpr std::uint16_t kOn = 0xff00;      // the value of a single coil
 
 bool has_good_values(std::span<const std::uint8_t> pdu, const Function& function,
                      std::uint32_t count) noexcept {
@@ -61,6 +62,9 @@ Frame first_frame(std::span<const std::uint8_t> received) noexcept {
   if (received.size() < kUncounted) return {};
   const std::size_t length = word_at(received, kLengthAt);
   if (length < kLeastLength || length > kMostLength) return {.state = FrameState::garbage, .size = 0};
+  // An exception is no request. The number of its refusal would not fit into a byte.
+  if (received.size() > kHeaderBytes && received[kHeaderBytes] >= kException)
+    return {.state = FrameState::garbage, .size = 0};
   if (received.size() < kUncounted + length) return {};
   return {.state = FrameState::whole, .size = kUncounted + length};
 }
@@ -79,6 +83,19 @@ std::expected<Request, std::uint8_t> parse_request(std::span<const std::uint8_t>
   if (!good) return refused(MODBUS_EXCEPTION_ILLEGAL_DATA_VALUE);
   if (address + std::uint32_t{count} > kRegisterSpace) return refused(MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS);
   return Request{.kind = function->kind, .writes = function->writes, .address = address, .count = count};
+}
+
+void take_written(std::span<const std::uint8_t> frame, const Request& request, MapValues& values) noexcept {
+  const auto pdu = frame.subspan(kHeaderBytes);
+  const bool single = pdu.size() == kPlainSize;
+  const auto data = pdu.subspan(single ? kPlainSize - 2 : kPlainSize + 1);
+  if (is_bit(request.kind)) {
+    const auto bits = values.bits(request.count);
+    for (std::size_t i = 0; i < bits.size(); ++i) bits[i] = data[i / 8] >> (i % 8) & 1U;
+    return;
+  }
+  const auto registers = values.registers(request.count);
+  for (std::size_t i = 0; i < registers.size(); ++i) registers[i] = word_at(data, 2 * i);
 }
 
 }  // namespace plchost::modbus

@@ -5,6 +5,7 @@
 #include <expected>
 #include <span>
 
+#include "instances/io/modbus/config/map_values.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 
 // The requests of a Modbus client, read without trust. Only those that pass here are answered by libmodbus:
@@ -34,5 +35,7 @@ struct Request {
 /// The request of a whole frame, or the number of the exception that answers it. Pure.
 [[nodiscard]] std::expected<Request, std::uint8_t> parse_request(
     std::span<const std::uint8_t> frame) noexcept;
+/// The values that the request of that frame writes. Pure.
+void take_written(std::span<const std::uint8_t> frame, const Request& request, MapValues& values) noexcept;
 
 }  // namespace plchost::modbus

@@ -91,9 +91,12 @@ bool answer(modbus_t* context, const ServedMaps& maps, std::span<const std::uint
                                             : mapping.nb_input_registers) = request->count;
   mapping.tab_bits = mapping.tab_input_bits = values.bits(request->count).data();
   mapping.tab_registers = mapping.tab_input_registers = values.registers(kMaxReadRegisters).data();
-  const int sent = modbus_reply(context, frame.data(), static_cast<int>(frame.size()), &mapping);
-  if (request->writes) maps.write(*request, values);
-  return sent > 0;
+  // Before the answer: a client that has it may look at the image.
+  if (request->writes) {
+    take_written(frame, *request, values);
+    maps.write(*request, values);
+  }
+  return modbus_reply(context, frame.data(), static_cast<int>(frame.size()), &mapping) > 0;
 }
 
 }  // namespace plchost::modbus

@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 #include "shm/base/time.hpp"
 
 namespace plchost::modbus {
 
 /// When a device is polled. Polls lie on a grid of absolute times. A poll that takes longer than the interval
-/// skips whole periods. After a failure the next poll comes after a pause that doubles up to a bound. Pure.
+/// skips whole periods. After a failure the next poll comes after a pause that doubles up to a bound, on the
+/// grid or, if that is shorter than the interval, beside it. Pure.
 class PollSchedule {
  public:
   PollSchedule(Duration interval, Duration pause, Duration longest_pause, TimePoint first) noexcept
@@ -18,16 +20,23 @@ class PollSchedule {
         pause_(pause),
         next_(first) {}
 
-  [[nodiscard]] TimePoint next() const noexcept { return next_; }
+  [[nodiscard]] TimePoint next() const noexcept { return retry_.value_or(next_); }
   /// Of the polls that were due while another one was under way.
   [[nodiscard]] std::uint64_t skipped() const noexcept { return skipped_; }
 
   void answered(TimePoint now) noexcept {
     pause_ = first_pause_;
+    retry_.reset();
     skipped_ += step_beyond(now) - 1;
   }
   void failed(TimePoint now) noexcept {
-    (void)step_beyond(now + pause_);
+    const TimePoint retry = now + pause_;
+    (void)step_beyond(retry);
+    retry_.reset();
+    if (pause_ < interval_) {
+      retry_ = retry;
+      next_ -= interval_;  // the time of the grid before it, from which the next one is counted
+    }
     pause_ = std::min(pause_ * 2, longest_pause_);
   }
 
@@ -45,6 +54,7 @@ class PollSchedule {
   Duration longest_pause_;
   Duration pause_;
   TimePoint next_;
+  std::optional<TimePoint> retry_;  ///< beside the grid
   std::uint64_t skipped_ = 0;
 };
 

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <expected>
+#include <span>
+#include <string>
+
+#include "instances/io/modbus/config/map_values.hpp"
+#include "instances/io/modbus/config/modbus_config.hpp"
+
+namespace plchost::modbus {
+
+// Requests to a device and its responses, without what is around them on TCP and on a serial line. Pure.
+
+/// A request that was not answered as it should be.
+struct LinkFailure {
+  std::uint8_t exception = 0;  ///< the code of the device; 0: no answer, or garbage
+  std::string text;
+};
+using LinkResult = std::expected<void, LinkFailure>;
+
+inline constexpr std::size_t kMaxPdu = 253;
+
+struct Pdu {
+  std::array<std::uint8_t, kMaxPdu> bytes{};
+  std::size_t size = 0;
+  [[nodiscard]] std::span<const std::uint8_t> view() const noexcept { return std::span(bytes).first(size); }
+};
+
+/// Asks for all of the map, which is a [[device.read]].
+[[nodiscard]] Pdu read_request(const RegisterMap& map) noexcept;
+/// Writes all of the map, which is a [[device.write]]. One register or coil has a function of its own: many
+/// devices have only that one, others only those for several.
+[[nodiscard]] Pdu write_request(const RegisterMap& map, MapValues& values) noexcept;
+
+/// The response to a read_request() of that map. The values change if all of it is good.
+[[nodiscard]] LinkResult take_values(const RegisterMap& map, std::span<const std::uint8_t> response,
+                                     MapValues& values);
+/// Whether the response confirms what was written: address, and count or value.
+[[nodiscard]] LinkResult check_written(const Pdu& request, std::span<const std::uint8_t> response);
+
+}  // namespace plchost::modbus
