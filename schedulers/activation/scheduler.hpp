@@ -30,6 +30,10 @@ struct SchedulerCapabilities {
 /// exchanges it between two ticks.
 class Scheduler {
  public:
+  /// Whether breakpoints in tasks of external events halt under it; else they are ignored. A class of
+  /// policies/ may say otherwise. The debugger asks before there is a scheduler, so it is in its entry.
+  static constexpr bool kHaltsExternalTasks = false;
+
   virtual ~Scheduler() = default;
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
   [[nodiscard]] virtual SchedulerCapabilities capabilities() const noexcept = 0;

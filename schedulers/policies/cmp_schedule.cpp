@@ -9,6 +9,8 @@ namespace plchost {
 /// after the other by priority. A release between two ticks waits for the next tick; its grid stays as it is.
 class CmpSchedule final : public Scheduler {
  public:
+  static constexpr bool kHaltsExternalTasks = true;
+
   explicit CmpSchedule(const SchedulerContext& context)
       : rule_(context.settings), table_(context.clock, context.tick_frequency) {}
 
@@ -33,6 +35,6 @@ class CmpSchedule final : public Scheduler {
   bool begun_ = false;
 };
 
-template std::unique_ptr<Scheduler> make_policy<CmpSchedule>(const SchedulerContext&);
+template SchedulerEntry make_policy_entry<CmpSchedule>(std::string_view);
 
 }  // namespace plchost

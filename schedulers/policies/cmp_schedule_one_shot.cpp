@@ -27,6 +27,6 @@ class CmpScheduleOneShot final : public Scheduler {
   Duration spin_ahead_max_;
 };
 
-template std::unique_ptr<Scheduler> make_policy<CmpScheduleOneShot>(const SchedulerContext&);
+template SchedulerEntry make_policy_entry<CmpScheduleOneShot>(std::string_view);
 
 }  // namespace plchost

@@ -26,6 +26,6 @@ class CmpScheduleTimer final : public Scheduler {
   FreewheelRule rule_;
 };
 
-template std::unique_ptr<Scheduler> make_policy<CmpScheduleTimer>(const SchedulerContext&);
+template SchedulerEntry make_policy_entry<CmpScheduleTimer>(std::string_view);
 
 }  // namespace plchost

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string_view>
 
 #include "schedulers/activation/scheduler.hpp"
 #include "schedulers/policies/registry.hpp"
@@ -8,8 +9,12 @@
 namespace plchost {
 
 template <class Policy>
-std::unique_ptr<Scheduler> make_policy(const SchedulerContext& context) {
-  return std::make_unique<Policy>(context);
+SchedulerEntry make_policy_entry(std::string_view name) {
+  return {.name = name,
+          .make = [](const SchedulerContext& context) -> std::unique_ptr<Scheduler> {
+            return std::make_unique<Policy>(context);
+          },
+          .halts_external_tasks = Policy::kHaltsExternalTasks};
 }
 
 }  // namespace plchost

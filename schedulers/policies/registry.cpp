@@ -9,18 +9,16 @@ namespace plchost {
 namespace {
 
 template <class Policy>
-constexpr SchedulerEntry entry_of(const PolicyName<Policy>& policy) {
-  return {
-      .name = policy.name, .make = &make_policy<Policy>, .halts_external_tasks = kHaltsExternalTasks<Policy>};
+SchedulerEntry entry_of(const PolicyName<Policy>& policy) {
+  return make_policy_entry<Policy>(policy.name);
 }
-
-constexpr std::array kSchedulers =
-    std::apply([](const auto&... policy) { return std::array{entry_of(policy)...}; }, kPolicies);
 
 }  // namespace
 
 std::span<const SchedulerEntry> all_schedulers() noexcept {
-  return kSchedulers;
+  static const auto schedulers =
+      std::apply([](const auto&... policy) { return std::array{entry_of(policy)...}; }, kPolicies);
+  return schedulers;
 }
 
 std::string scheduler_names() {
@@ -28,7 +26,7 @@ std::string scheduler_names() {
 }
 
 Result<const SchedulerEntry*> find_scheduler(std::string_view name) {
-  for (const SchedulerEntry& entry : kSchedulers) {
+  for (const SchedulerEntry& entry : all_schedulers()) {
     if (entry.name == name) return &entry;
   }
   return failure(ErrorCode::invalid_argument,

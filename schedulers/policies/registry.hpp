@@ -28,12 +28,6 @@ inline constexpr std::tuple kPolicies{
     PolicyName<class CmpScheduleOneShot>{"CmpScheduleOneShot"},
 };
 
-/// Whether breakpoints in tasks of external events halt under this scheduler; else they are ignored.
-template <class Policy>
-inline constexpr bool kHaltsExternalTasks = false;
-template <>
-inline constexpr bool kHaltsExternalTasks<class CmpSchedule> = true;
-
 /// Their names, for programs that do not link the schedulers.
 inline constexpr std::array kSchedulerNames =
     std::apply([](const auto&... policy) { return std::array{policy.name...}; }, kPolicies);
@@ -42,12 +36,12 @@ inline constexpr std::array kSchedulerNames =
 struct SchedulerEntry {
   std::string_view name;
   std::unique_ptr<Scheduler> (*make)(const SchedulerContext&);
-  bool halts_external_tasks = false;  ///< see kHaltsExternalTasks
+  bool halts_external_tasks = false;  ///< see Scheduler::kHaltsExternalTasks
 };
 
-/// Makes a scheduler. The file of `Policy` instantiates it.
+/// The entry of a scheduler. The file of `Policy` instantiates it, see policy.hpp.
 template <class Policy>
-[[nodiscard]] std::unique_ptr<Scheduler> make_policy(const SchedulerContext& context);
+[[nodiscard]] SchedulerEntry make_policy_entry(std::string_view name);
 
 [[nodiscard]] std::span<const SchedulerEntry> all_schedulers() noexcept;
 /// All of them in one text, with commas in between.

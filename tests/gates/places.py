@@ -138,7 +138,7 @@ def scheduler(scratch):
     scratch.plant("schedulers/policies/registry.hpp", "inline constexpr std::tuple kPolicies{", '\n    PolicyName<class Planted>{"Planted"},')
     yield
     scratch.check(PLANTS["policy is listed"])
-    scratch.must_make("make_policy<plchost::Planted>", "schedulers/policies/registry.cpp", "schedulers/policies/planted.cpp")
+    scratch.must_make("make_policy_entry<plchost::Planted>", "schedulers/policies/registry.cpp", "schedulers/policies/planted.cpp")
     scratch.must_build("schedulers", "policies/planted.cpp")
 
 

@@ -40,13 +40,14 @@ TEST(Registry, UnknownNameListsTheKnown) {
   EXPECT_THAT(found.error().message, testing::HasSubstr(scheduler_names()));
 }
 
-TEST(Registry, EachSchedulerHasItsNameAndOnlyOneShotMovesReleases) {
+TEST(Registry, EachSchedulerHasItsNameAndItsCapabilities) {
   LinuxClock clock;
   for (const SchedulerEntry& entry : all_schedulers()) {
     const auto scheduler = entry.make({.clock = clock, .settings = {}});
     EXPECT_LE(entry.name.size(), kMaxSchedulerName);
     EXPECT_EQ(scheduler->name(), entry.name);
     EXPECT_EQ(scheduler->capabilities().one_shot, entry.name == "CmpScheduleOneShot");
+    EXPECT_EQ(entry.halts_external_tasks, entry.name == "CmpSchedule");
   }
 }
 
