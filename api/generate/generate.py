@@ -149,6 +149,13 @@ def topic_names(contract):
     lines.append("\n// The beginning of the partition's name.")
     for letter, what in PARTITIONS.items():
         lines.append(f'inline constexpr std::string_view k{what.capitalize()}Partition = "{letter}.";')
+    lines.append("\n// Each by itself; those of a role by its folder; the requests of all roles.")
+    for kind in (kind for kind in contract.types if kind.is_topic):
+        lines += [f'inline constexpr std::string_view {constant_of(kind, name)} = "{name}";' for name in names_of(kind)]
+    requests = names_of(next(kind for kind in contract.types if kind.name == "Request"))
+    lines += [f'inline constexpr std::string_view k{ROLES[name.split("/")[2]]}Topics = "{name.rpartition("/")[0]}/*";' for name in requests]
+    (each,) = {re.sub(rf"/({'|'.join(ROLES)})/", "/*/", name) for name in requests}
+    lines.append(f'inline constexpr std::string_view kRequests = "{each}";')
     return "\n".join(lines + ["\n}  // namespace plchost::topic_names\n"])
 
 

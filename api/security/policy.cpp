@@ -15,11 +15,16 @@ namespace plchost::security {
 namespace {
 
 using Topics = std::vector<std::string_view>;
+using topic_names::kBlockHostStatus;
 using topic_names::kBlocksPartition;
 using topic_names::kClientPartition;
+using topic_names::kEngineerTopics;
 using topic_names::kHostPartition;
 using topic_names::kNamePartition;
+using topic_names::kOperatorRequest;
+using topic_names::kRequests;
 using topic_names::kStatusPartition;
+using topic_names::kViewerRequest;
 
 /// Some topics in some partitions; no partition: the default one.
 struct Grant {
@@ -50,18 +55,20 @@ Topics asking(const Topics& more) {
   return topics;
 }
 
-// A host writes into partitions that name it: no reader takes its samples in the name of another.
+// The names come from the contract. Which requests a role may write stays written out, so the requests of a
+// new role are no right of viewers, operators and engineers. A host writes into partitions that name it: no
+// reader takes its samples in the name of another.
 std::vector<Grant> may_write(const Subject& subject) {
   const std::string& name = subject.name;
   switch (subject.role) {
     case Role::viewer:
-      return {{{"plc/v1/all/request"}, in(kHostPartition, "*")}};
+      return {{{kViewerRequest}, in(kHostPartition, "*")}};
     case Role::operating:
-      return {{asking({"plc/v1/all/request", "plc/v1/op/request"}), in(kHostPartition, "*")}};
+      return {{asking({kViewerRequest, kOperatorRequest}), in(kHostPartition, "*")}};
     case Role::engineer:
-      return {{asking({"plc/v1/all/request", "plc/v1/op/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
+      return {{asking({kViewerRequest, kOperatorRequest, kEngineerTopics}), in(kHostPartition, "*")}};
     case Role::admin:
-      return {{asking({"plc/v1/*/request", "plc/v1/eng/*"}), in(kHostPartition, "*")}};
+      return {{asking({kRequests, kEngineerTopics}), in(kHostPartition, "*")}};
     case Role::host:
       return {{topics_of(topic_names::kStatus), in(kStatusPartition, name)},
               {topics_of(topic_names::kClient), in(kClientPartition, "*/" + name)},
@@ -74,8 +81,8 @@ std::vector<Grant> may_write(const Subject& subject) {
 std::vector<Grant> may_read(const Subject& subject, const GuidPrefix& prefix) {
   const std::string& name = subject.name;
   if (subject.role == Role::host) {
-    return {{{"plc/v1/status/block_host"}, in(kStatusPartition, "*")},
-            {asking({"plc/v1/*/request", "plc/v1/eng/*"}), in(kHostPartition, name)},
+    return {{{kBlockHostStatus}, in(kStatusPartition, "*")},
+            {asking({kRequests, kEngineerTopics}), in(kHostPartition, name)},
             {topics_of(topic_names::kBlocks), in(kBlocksPartition, name + "/*")},
             {topics_of(topic_names::kName), in(kNamePartition, name)}};
   }

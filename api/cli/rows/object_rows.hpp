@@ -19,6 +19,7 @@ namespace plchost {
 
 /// For the table: a line of few cells, see object_columns().
 [[nodiscard]] Row to_short_row(std::string_view host, const ListedObject& object);
+/// `value` and `by` put several members of a record together, so control.idl has no columns for it.
 [[nodiscard]] const std::vector<Column>& object_columns();
 
 /// The changing part of an object, in words: "12 posts, registered, 1 tasks", "held by demo(4711), thread
