@@ -288,9 +288,12 @@ void Manager::transition(const InstanceStatus& status, InstanceState from, Insta
                    reason);
 }
 
-void Manager::wrong_step(const InstanceStatus& status, std::string_view what) {
+// The process has taken the step already, so its instance is not kept from it.
+void Manager::stepped(const InstanceStatus& status, InstancePhase from, InstancePhase to) {
+  const std::string wrong = wrong_step(from, to, status.state);
+  if (wrong.empty()) return;
   spdlog::error("instance {}: {}; this is a fault of plchostd: report it with its log", status.name.view(),
-                what);
+                wrong);
 }
 
 // The instance first: a reader of the number finds it.

@@ -70,7 +70,7 @@ class Manager : private InstanceObserver {
   void changed(std::size_t place, const InstanceStatus& status) override;
   void transition(const InstanceStatus& status, InstanceState from, InstanceState to,
                   std::string_view reason) override;
-  void wrong_step(const InstanceStatus& status, std::string_view what) override;
+  void stepped(const InstanceStatus& status, InstancePhase from, InstancePhase to) override;
   void gone(std::size_t place, const InstanceConfig& config) override;
   void end(int signal);
   void shut_down();

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "manager/config/manager_config.hpp"
+#include "manager/supervisor/instance_phase.hpp"
 #include "shm/pages/host_page.hpp"
 
 namespace plchost {
@@ -19,8 +20,9 @@ class InstanceObserver {
   /// its application.
   virtual void transition(const InstanceStatus& status, InstanceState from, InstanceState to,
                           std::string_view reason) = 0;
-  /// A step was taken that the table of instance_phase.hpp has not: a fault of the manager.
-  virtual void wrong_step(const InstanceStatus& status, std::string_view what) = 0;
+  /// The instance has taken a step from one phase to another, or stays in its phase, and shows `status` now.
+  /// See wrong_step().
+  virtual void stepped(const InstanceStatus& status, InstancePhase from, InstancePhase to) = 0;
   /// There is no instance at `place` any more; the last one had this configuration.
   virtual void gone(std::size_t place, const InstanceConfig& config) = 0;
 };

@@ -27,7 +27,7 @@ constexpr auto kPhaseSteps = [] {
       {backing_off, adopting,    "a process of its name is there"},
       {setting_up,  down,        "its process has ended, and no other is to start"},
       {setting_up,  backing_off, "its process has ended, and another is to start"},
-      {setting_up,  up,          "its process reports that it is ready"},
+      {setting_up,  up,          "its process reports that it is ready, or a fault keeps it from that"},
       {setting_up,  ending,      "its process is replaced, it is removed, or its manager ends"},
       {adopting,    down,        "its process has ended, and no other is to start"},
       {adopting,    backing_off, "its process has ended, and another is to start"},

@@ -359,14 +359,12 @@ Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string&
 
 void ManagedInstance::set_state(Phase phase, InstanceState state, const std::string& problem) {
   const InstanceState before = status_.state;
-  // The process has taken the step already, so the phase follows it all the same.
-  const std::string wrong = wrong_step(phase_, phase, state);
-  if (!wrong.empty()) surroundings_.observer.wrong_step(status_, wrong);
-  const bool was_up = phase_ == Phase::up;
+  const Phase from = std::exchange(phase_, phase);
+  const bool was_up = from == Phase::up;
   if (state != before) status_.state_since_unix_ns = unix_time_ns();
-  phase_ = phase;
   status_.state = state;
   status_.problem.assign(problem);
+  surroundings_.observer.stepped(status_, from, phase);
   const bool bad = state == InstanceState::failed || state == InstanceState::safe_mode ||
                    state == InstanceState::exception;
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "instance {}: {}{}{}", config_.name,

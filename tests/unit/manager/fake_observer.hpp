@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -27,12 +28,15 @@ class FakeObserver : public InstanceObserver {
                   std::string_view reason) override {
     transitions.emplace_back(from, to, reason);
   }
-  void wrong_step(const InstanceStatus& /*status*/, std::string_view what) override {
-    wrong.emplace_back(what);
+  void stepped(const InstanceStatus& status, InstancePhase from, InstancePhase to) override {
+    if (from != to) steps.emplace_back(from, to);
+    if (std::string what = wrong_step(from, to, status.state); !what.empty())
+      wrong.push_back(std::move(what));
   }
   void gone(std::size_t place, const InstanceConfig& config) override { ended[place] = config.name; }
 
   std::vector<std::string> wrong;
+  std::vector<std::pair<InstancePhase, InstancePhase>> steps;
   std::map<std::size_t, InstanceStatus> shown;
   std::map<std::size_t, std::string> ended;
   std::vector<std::tuple<InstanceState, InstanceState, std::string>> transitions;
