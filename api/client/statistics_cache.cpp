@@ -1,6 +1,6 @@
 #include "api/client/statistics_cache.hpp"
 
-#include <algorithm>
+#include <status_fields.hpp>
 
 #include "api/dds/host_writers.hpp"
 #include "api/dds/sequence.hpp"
@@ -8,39 +8,24 @@
 
 namespace plchost {
 
-namespace {
-
-/// Copies a histogram and takes it out of the sample.
-HistogramReport take_out(plc_DurationHistogram& sample) {
-  HistogramReport report;
-  report.total = sample.total;
-  std::ranges::copy(sample.percentiles_ns, report.percentiles_ns.begin());
-  const auto bars = dds::parts_of(sample.bars);
-  report.bars.assign(bars.begin(), bars.end());
-  sample = {};
-  return report;
+StatisticsReport::StatisticsReport(const plc_TaskStatistics& sample) : sample_(sample) {
+  sample_.ext = {};
+  const auto bars = std::make_shared<std::vector<std::vector<plc_HistogramBar>>>();
+  dds::visit_parts(sample_, [&](const dds::PartInfo& /*info*/, auto& part) {
+    if constexpr (requires { part.bars; }) {
+      const auto lent = dds::parts_of(part.bars);
+      dds::lend(part.bars, bars->emplace_back(lent.begin(), lent.end()));
+    }
+  });
+  bars_ = bars;
 }
-
-StatisticsReport to_report(const plc_TaskStatistics& sample) {
-  StatisticsReport report;
-  report.numbers = sample;
-  report.numbers.ext = {};
-  report.latency = take_out(report.numbers.latency_histogram);
-  report.execution = take_out(report.numbers.execution_histogram);
-  report.release_jitter = take_out(report.numbers.release_jitter_histogram);
-  report.jitter_negative = take_out(report.numbers.jitter_negative_histogram);
-  report.jitter_positive = take_out(report.numbers.jitter_positive_histogram);
-  return report;
-}
-
-}  // namespace
 
 void StatisticsCache::update() {
   if (!from_) return;
   dds::take_changes<plc_TaskStatistics>(
       from_.reader.get(), writers_,
       [this](dds_instance_handle_t handle, const plc_TaskStatistics& sample) {
-        reports_[handle] = to_report(sample);
+        reports_.insert_or_assign(handle, StatisticsReport(sample));
       },
       [this](dds_instance_handle_t handle, dds::InstanceEnd /*why*/) { reports_.erase(handle); });
 }
@@ -49,9 +34,9 @@ std::optional<StatisticsReport> StatisticsCache::find(std::string_view host, std
                                                       std::string_view instance,
                                                       std::string_view task) const {
   for (const auto& [handle, report] : reports_) {
-    const plc_TaskStatistics& numbers = report.numbers;
-    if (numbers.epoch == epoch && dds::text_of(numbers.host) == host &&
-        dds::text_of(numbers.instance) == instance && dds::text_of(numbers.task) == task) {
+    const plc_TaskStatistics& sample = report.sample();
+    if (sample.epoch == epoch && dds::text_of(sample.host) == host &&
+        dds::text_of(sample.instance) == instance && dds::text_of(sample.task) == task) {
       return report;
     }
   }

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -14,21 +14,16 @@
 
 namespace plchost {
 
-/// A histogram as it came: percentiles in the order of the topic (50, 90, 99, 99.9, 99.99 %).
-struct HistogramReport {
-  std::uint64_t total = 0;
-  std::array<std::int64_t, 5> percentiles_ns{};
-  std::vector<plc_HistogramBar> bars;  ///< ascending
-};
+/// The statistics of one task: a sample without its `ext`, whose bars outlive the loan. Copies share the
+/// bars.
+class StatisticsReport {
+ public:
+  explicit StatisticsReport(const plc_TaskStatistics& sample);
+  [[nodiscard]] const plc_TaskStatistics& sample() const noexcept { return sample_; }
 
-/// The statistics of one task.
-struct StatisticsReport {
-  plc_TaskStatistics numbers{};  ///< without the histograms
-  HistogramReport latency;
-  HistogramReport execution;
-  HistogramReport release_jitter;
-  HistogramReport jitter_negative;
-  HistogramReport jitter_positive;
+ private:
+  plc_TaskStatistics sample_;
+  std::shared_ptr<const std::vector<std::vector<plc_HistogramBar>>> bars_;  // of each histogram
 };
 
 /// The newest statistics of each task. Beside StatusCache, because these samples have parts that live on loan

@@ -35,6 +35,14 @@ struct FieldInfo {
   bool null_if_empty = false;               ///< an empty text means so
 };
 
+/// A member with members of its own, of a type that has a row. visit_parts(sample, visit) calls
+/// visit(PartInfo, part) for each but sequences. They come in the order of the row.
+struct PartInfo {
+  std::string_view name;  ///< in control.idl
+  std::string_view row;   ///< in the rows of plcctl
+  std::string_view text;  ///< its comment
+};
+
 /// The fields of a row of `Sample` that plcctl computes: one member for each that `row:` calls computed.
 template <class Sample, class Value>
 struct Computed {};

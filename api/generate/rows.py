@@ -18,12 +18,19 @@ def words_of(member):
     return words if len(words) > 1 else []
 
 
+def single_members(kind):
+    """The members but for sequences; `epoch` is none of a row's."""
+    return [member for member in kind.members if member.name != "epoch" and not member.type.startswith("sequence")]
+
+
+def is_part(contract, member):
+    """It has members of its own."""
+    return member.type.split("[")[0] in (other.name for other in contract.types if not other.is_topic)
+
+
 def plain_members(contract, kind):
-    """The members that are one value; `epoch` is none of a row's."""
-    nested = {other.name for other in contract.types if not other.is_topic}
-    for member in kind.members:
-        if member.name != "epoch" and not member.type.startswith("sequence") and member.type.split("[")[0] not in nested:
-            yield member
+    """Those that are one value."""
+    return [member for member in single_members(kind) if not is_part(contract, member)]
 
 
 def value_of(member, sample="sample"):
@@ -76,8 +83,8 @@ PART = re.compile(
 
 
 def row_fields(contract, kind):
-    """The fields of a row: those of `row:` in its order. A member that it does not name stays behind the one before it."""
-    members = {member.name: member for member in plain_members(contract, kind)}
+    """The fields and parts of a row: those of `row:` in its order. A member that it does not name stays behind the one before it."""
+    members = {member.name: member for member in single_members(kind)}
     fields, named = [], set()
     for part in listed(kind, "row"):
         found = PART.fullmatch(part)
@@ -146,9 +153,11 @@ def fields_of(contract, kind):
 
 
 def row_of(contract, kind):
-    """visit_row() of a type, and Computed, its fields that are computed."""
-    fields = row_fields(contract, kind)
-    computed = [field.row for _, field in fields if not field.member]
+    """visit_row() of a type, Computed, its fields that are computed, and visit_parts(), if it has any."""
+    fields, parts = [], []
+    for _, field in row_fields(contract, kind):
+        (parts if field.member and is_part(contract, field.member) else fields).append(field)
+    computed = [field.row for field in fields if not field.member]
     lines = []
     if computed:
         lines += ["template <class Value>", f"struct Computed<plc_{kind.name}, Value> {{"]
@@ -156,14 +165,24 @@ def row_of(contract, kind):
     lines += [f"template <>\ninline constexpr bool kHasRow<plc_{kind.name}> = true;", "template <class Value, class Visit>"]
     lines.append(f"void visit_row(const plc_{kind.name}& sample, [[maybe_unused]] const Computed<plc_{kind.name}, Value>& computed,")
     lines.append("               Visit&& visit) {")
-    for _, field in fields:
+    for field in fields:
         lines.append(f"  visit({field.info(kind)}, {value_of(field.member) if field.member else f'computed.{field.row}'});")
-    return lines + ["}\n"]
+    lines.append("}\n")
+    if parts:
+        lines += ["template <class Sample, class Visit>", f"  requires std::same_as<std::remove_const_t<Sample>, plc_{kind.name}>"]
+        lines.append("constexpr void visit_parts(Sample& sample, Visit&& visit) {")
+        for part in parts:
+            text = part.member.comment.replace("\\", "\\\\").replace('"', '\\"')
+            told = f'.name = "{part.member.name}", .row = "{part.row}", .text = "{text}"'
+            lines.append(f"  visit(PartInfo{{{told}}}, sample.{part.member.name});")
+        lines.append("}\n")
+    return lines
 
 
 def status_fields(contract, counted, head):
     """The fields of the status topics that HostStatus counts, and the rows of these and of other topics that plcctl shows."""
-    lines = [head + "#include <array>\n#include <string_view>\n", "#include <code_words.hpp>", "#include <status_topics.hpp>\n"]
+    lines = [head + "#include <array>\n#include <concepts>\n#include <string_view>\n#include <type_traits>\n"]
+    lines += ["#include <code_words.hpp>", "#include <status_topics.hpp>\n"]
     lines += ['#include "api/dds/field_info.hpp"\n', "namespace plchost::dds {\n"]
     for kind in counted:
         lines += fields_of(contract, kind)

@@ -43,7 +43,7 @@ Async<Result<Client::TaskStatistics>> read_statistics(CallOrder& order, ClientCo
   PLCHOST_CO_TRY_ASSIGN(const auto place, co_await order.place(core, host));
   PLCHOST_CO_TRY_ASSIGN(const auto report,
                         co_await core.statistics(place.host, instance, task, place.deadline));
-  co_return to_public(report);
+  co_return to_public(report.sample());
 }
 
 Async<Result<std::vector<Client::Record>>> read_topic(CallOrder& order, ClientCore& core, std::string topic,

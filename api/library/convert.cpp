@@ -61,14 +61,6 @@ constexpr bool each_is_told_by_its_number() {
 }
 static_assert(each_is_told_by_its_number());
 
-// A StatisticsReport has the parts of histograms beside its sample.
-client_types::DurationHistogram histogram_of(const HistogramReport& report) {
-  client_types::DurationHistogram made{
-      .total = report.total, .percentiles = durations(report.percentiles_ns), .bars = {}};
-  for (const plc_HistogramBar& bar : report.bars) made.bars.push_back(to_public(bar));
-  return made;
-}
-
 }  // namespace
 
 Client::Host to_public(const HostView& host, bool answers) {
@@ -77,16 +69,6 @@ Client::Host to_public(const HostView& host, bool answers) {
   made.name = host.name;
   made.answers = answers;
   made.instances = count_of<plc_InstanceStatus>(host.status).value_or(0);
-  return made;
-}
-
-Client::TaskStatistics to_public(const StatisticsReport& report) {
-  Client::TaskStatistics made = to_public(report.numbers);
-  made.latency_histogram = histogram_of(report.latency);
-  made.execution_histogram = histogram_of(report.execution);
-  made.release_jitter_histogram = histogram_of(report.release_jitter);
-  made.jitter_negative_histogram = histogram_of(report.jitter_negative);
-  made.jitter_positive_histogram = histogram_of(report.jitter_positive);
   return made;
 }
 

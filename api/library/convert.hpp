@@ -10,7 +10,6 @@ namespace plchost {
 
 /// From what travels to what the library's users see, where library_conversions.hpp has it not. Any context.
 [[nodiscard]] Client::Host to_public(const HostView& host, bool answers);
-[[nodiscard]] Client::TaskStatistics to_public(const StatisticsReport& report);
 [[nodiscard]] Client::Transition to_public(const TransitionView& transition);
 [[nodiscard]] Client::LogLine to_public(const LogText& line);
 [[nodiscard]] Client::Outcome to_public(const PostReport& report);

@@ -57,12 +57,13 @@ void TaskRecorder::record(const RecordedCycle& cycle) noexcept {
   const bool is_period = has_start_ && cycle.interval > Duration::zero();
   count(cycle);
   if (owns) {
-    statistics_.latency.record(cycle.start - cycle.release);
-    statistics_.execution.record(cycle.end - cycle.start);
+    statistics_[TaskHistogram::latency].record(cycle.start - cycle.release);
+    statistics_[TaskHistogram::execution].record(cycle.end - cycle.start);
     if (is_period) {
       const Duration jitter(counters_.jitter_last_ns);
-      auto& histogram = jitter < Duration::zero() ? statistics_.jitter_negative : statistics_.jitter_positive;
-      histogram.record(std::chrono::abs(jitter));
+      const auto half =
+          jitter < Duration::zero() ? TaskHistogram::jitter_negative : TaskHistogram::jitter_positive;
+      statistics_[half].record(std::chrono::abs(jitter));
     }
     statistics_.counters.write(counters_);
     release();
@@ -143,10 +144,7 @@ void TaskRecorder::count(const RecordedCycle& cycle) noexcept {
 
 bool TaskRecorder::reset(TimePoint now) noexcept {
   if (!acquire(Owner::resetter)) return false;
-  for (DurationHistogram* histogram : {&statistics_.latency, &statistics_.execution,
-                                       &statistics_.jitter_negative, &statistics_.jitter_positive}) {
-    histogram->clear();
-  }
+  for (DurationHistogram& histogram : statistics_.histograms) histogram.clear();
   ++resets_;
   since_ns_ = now.time_since_epoch().count();
   since_unix_ns_ = unix_time_ns();

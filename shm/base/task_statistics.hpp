@@ -74,9 +74,15 @@ struct TaskCounters {
   return std::max(counters.jitter_max_ns, -std::max(counters.jitter_min_ns, -INT64_MAX));
 }
 
-/// The histograms of a task: where the buckets of each lie in its memory.
-enum class TaskHistogram : std::uint8_t { latency, execution, jitter_negative, jitter_positive };
-inline constexpr std::size_t kTaskHistograms = 4;
+/// The histograms of a task, in the order of their buckets in its memory.
+enum class TaskHistogram : std::uint8_t {
+  latency,
+  execution,
+  jitter_negative,  ///< magnitudes of the deviations below zero
+  jitter_positive,  ///< zero is here
+  count,
+};
+inline constexpr auto kTaskHistograms = static_cast<std::size_t>(TaskHistogram::count);
 /// Up to so many tasks have histograms of 3 significant digits (352 KiB a task), more have 2 (50 KiB), unless
 /// the settings say otherwise.
 inline constexpr std::uint32_t kMaxFineTasks = 64;
@@ -93,17 +99,13 @@ class TaskStatistics {
       : TaskStatistics(HistogramShape(digits), std::make_unique<Memory>(HistogramShape(digits))) {}
   /// In the memory of somebody else. `buckets`: task_bucket_count(shape) of them.
   TaskStatistics(HistogramShape shape, Seqlock<TaskCounters>& place, HistogramBuckets buckets) noexcept
-      : counters(place),
-        latency(shape, part(shape, buckets, TaskHistogram::latency)),
-        execution(shape, part(shape, buckets, TaskHistogram::execution)),
-        jitter_negative(shape, part(shape, buckets, TaskHistogram::jitter_negative)),
-        jitter_positive(shape, part(shape, buckets, TaskHistogram::jitter_positive)) {}
+      : counters(place), histograms(all_of(shape, buckets, std::make_index_sequence<kTaskHistograms>())) {}
 
   Seqlock<TaskCounters>& counters;
-  DurationHistogram latency;
-  DurationHistogram execution;
-  DurationHistogram jitter_negative;  ///< magnitudes of the deviations below zero
-  DurationHistogram jitter_positive;  ///< zero is here
+  std::array<DurationHistogram, kTaskHistograms> histograms;
+  [[nodiscard]] DurationHistogram& operator[](TaskHistogram which) noexcept {
+    return histograms[static_cast<std::size_t>(which)];
+  }
 
   /// Where the buckets of one histogram lie among all of a task.
   template <class Buckets>
@@ -112,6 +114,11 @@ class TaskStatistics {
   }
 
  private:
+  template <std::size_t... Which>
+  [[nodiscard]] static std::array<DurationHistogram, kTaskHistograms> all_of(
+      HistogramShape shape, HistogramBuckets buckets, std::index_sequence<Which...> /*all*/) noexcept {
+    return {DurationHistogram(shape, part(shape, buckets, static_cast<TaskHistogram>(Which)))...};
+  }
   struct Memory {
     explicit Memory(HistogramShape shape) : buckets(task_bucket_count(shape)) {}
     Seqlock<TaskCounters> counters;

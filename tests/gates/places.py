@@ -170,6 +170,24 @@ def command(scratch):
     scratch.compile("instances/runtime/instance/instance_control.cpp", "api/cli/verbs/command_verbs.cpp", "api/cli/verbs/host_commands.cpp")
 
 
+def histogram(scratch):
+    scratch.plant("shm/base/task_statistics.hpp", "  count,\n};", "  planted,\n", before=True)
+    scratch.plant("shm/pages/instance_page.cpp", ".version = 14}", ".version = 15}", instead=True)
+    scratch.plant("schedulers/tasks/task_recorder.cpp", "statistics_[TaskHistogram::execution].record(cycle.end - cycle.start);",
+                  "\n    statistics_[TaskHistogram::planted].record(cycle.spun);")
+    scratch.plant("api/control.idl", "DurationHistogram jitter_positive_histogram;  // and of the rest",
+                  "\n    DurationHistogram planted_histogram;  // of plants")
+    scratch.plant("api/server/status/statistics_writer.cpp", "  histograms.put(sample.latency_histogram, latency);",
+                  "\n  histograms.put(sample.planted_histogram, digest_of(TaskHistogram::planted, 0, 1'000));")
+    yield
+    scratch.documents()
+    scratch.types_in_c()
+    scratch.generate()
+    scratch.check(PLANTS["histogram has its parts"])
+    scratch.compile("shm/pages/instance_page.cpp", "schedulers/tasks/task_recorder.cpp", "api/server/status/statistics_writer.cpp",
+                    "api/client/statistics_cache.cpp", "api/cli/rows/statistics_rows.cpp")
+
+
 def status_topic(scratch):
     scratch.plant("api/control.idl", "  // An object of the pool, with all that is known of it.", PLANTS["topic"], before=True)
     scratch.plant("api/server/status/status_publisher.cpp", "  running_ = 0;\n", PLANTS["samples of the topic"])
@@ -228,6 +246,7 @@ PLACES = {
     "scheduler": (scheduler, "schedulers/README.md", 2),
     "kind of task": (kind_of_task, "schedulers/README.md", 4),
     "command": (command, "api/README.md", 2),
+    "histogram": (histogram, "api/README.md", 5),
     "status topic": (status_topic, "api/README.md", 2),
     "key": (key, "manager/configuration.md", 2),
     "setting": (setting, "instances/README.md", 2),

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "api/dds/sequence.hpp"
 #include "shm/base/duration_histogram.hpp"
 
 namespace plchost {
@@ -34,10 +35,11 @@ struct Range {
   [[nodiscard]] std::size_t size() const noexcept { return end - begin; }
 };
 
-Range range_of(const HistogramReport& histogram) {
-  if (histogram.bars.empty()) return {};
-  return {kPlotBars.index_of(Duration(histogram.bars.front().lower_ns)),
-          kPlotBars.index_of(Duration(histogram.bars.back().lower_ns)) + 1};
+Range range_of(const plc_DurationHistogram& histogram) {
+  const auto bars = dds::parts_of(histogram.bars);
+  if (bars.empty()) return {};
+  return {kPlotBars.index_of(Duration(bars.front().lower_ns)),
+          kPlotBars.index_of(Duration(bars.back().lower_ns)) + 1};
 }
 
 /// The power of ten in bars [begin, end); 0: none.
@@ -57,9 +59,10 @@ std::string decade_name(std::int64_t decade) {
   return fmt::format("{}{}", decade, kUnits[unit]);
 }
 
-std::vector<PlotColumn> plot_columns(const HistogramReport& histogram, Range range, std::size_t bars_each) {
+std::vector<PlotColumn> plot_columns(const plc_DurationHistogram& histogram, Range range,
+                                     std::size_t bars_each) {
   std::vector<PlotColumn> columns((range.size() + bars_each - 1) / bars_each);
-  for (const auto& bar : histogram.bars) {
+  for (const auto& bar : dds::parts_of(histogram.bars)) {
     const std::size_t index = kPlotBars.index_of(Duration(bar.lower_ns));
     // Bars from the network may be in any order.
     if (index >= range.begin && index < range.end)
@@ -140,13 +143,14 @@ std::string short_duration(std::int64_t nanoseconds) {
   return fmt::format("{:.{}f}{}", value, decimals, kUnits[unit]);
 }
 
-std::string plot(const HistogramReport& histogram, PlotStyle style) {
+std::string plot(const plc_DurationHistogram& histogram, PlotStyle style) {
   const Range range = range_of(histogram);
   if (range.size() == 0 || range.end < range.begin || histogram.total == 0) return "  nothing recorded\n";
   return draw(plot_columns(histogram, range, bars_each(range.size(), style)), histogram.total, style);
 }
 
-std::string plot_signed(const HistogramReport& negative, const HistogramReport& positive, PlotStyle style) {
+std::string plot_signed(const plc_DurationHistogram& negative, const plc_DurationHistogram& positive,
+                        PlotStyle style) {
   const Range left = range_of(negative);
   const Range right = range_of(positive);
   const std::uint64_t total = negative.total + positive.total;

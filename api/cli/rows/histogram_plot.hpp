@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "api/client/statistics_cache.hpp"
+#include <control.h>
 
 namespace plchost {
 
@@ -17,11 +17,11 @@ struct PlotStyle {
 
 /// A few lines: bars over a logarithmic axis of durations, shares of all records to the left. Of nothing
 /// recorded: one line that says so.
-[[nodiscard]] std::string plot(const HistogramReport& histogram, PlotStyle style);
+[[nodiscard]] std::string plot(const plc_DurationHistogram& histogram, PlotStyle style);
 /// The same of deviations with a sign: the negative ones to the left of zero, as magnitudes in their own
 /// histogram.
-[[nodiscard]] std::string plot_signed(const HistogramReport& negative, const HistogramReport& positive,
-                                      PlotStyle style);
+[[nodiscard]] std::string plot_signed(const plc_DurationHistogram& negative,
+                                      const plc_DurationHistogram& positive, PlotStyle style);
 
 /// "980ns", "1.50us", "12.0ms", "3.00s".
 [[nodiscard]] std::string short_duration(std::int64_t nanoseconds);

@@ -85,7 +85,7 @@ int show_statistics(CliSession& session, const plc_TaskStatus& task) {
   if (!report) return CliSession::fail(report.error());
   Row row = to_row(task);
   if (session.options.json) {
-    add_statistics(row, *report);
+    add_statistics(row, report->sample());
     return show_row(session, row);
   }
   // The fields that the statistics tell in more detail are left to them.
@@ -94,7 +94,7 @@ int show_statistics(CliSession& session, const plc_TaskStatus& task) {
        {"host", "instance", "task", "kind", "priority", "interval_us", "state", "external_event"}) {
     identity[field] = row[field];
   }
-  fmt::print("{}{}", format_fields(identity), format_statistics(*report, terminal_style()));
+  fmt::print("{}{}", format_fields(identity), format_statistics(report->sample(), terminal_style()));
   return kExitDone;
 }
 

@@ -1,9 +1,9 @@
 #include "api/server/status/statistics_writer.hpp"
 
 #include <algorithm>
-#include <array>
-#include <limits>
-#include <span>
+#include <iterator>
+#include <type_traits>
+#include <vector>
 
 #include "api/dds/host_writers.hpp"
 #include "api/dds/sequence.hpp"
@@ -15,33 +15,20 @@ namespace plchost {
 
 namespace {
 
-using Bars = std::array<plc_HistogramBar, HistogramDigest::kMaxBars>;
-
-/// A histogram as the topic has it. The bars live here until the sample is written.
-class Histogram {
+/// The histograms of a sample. Their bars live here until it is written.
+class Histograms {
  public:
-  Histogram(const HistogramView& view, std::int64_t least_ns, std::int64_t greatest_ns)
-      : Histogram(HistogramDigest(view, Duration(least_ns), Duration(greatest_ns))) {}
-  explicit Histogram(const HistogramDigest& digest) : digest_(digest) {
-    for (std::size_t i = 0; i < digest_.bars().size(); ++i) {
-      const auto& bar = digest_.bars()[i];
-      bars_[i] = {.lower_ns = bar.lower.count(), .count = bar.count};
-    }
+  void put(plc_DurationHistogram& into, const HistogramDigest& digest) {
+    into.total = digest.total();
+    static_assert(std::extent_v<decltype(into.percentiles_ns)> == HistogramDigest::kFractions.size());
+    std::ranges::transform(digest.percentiles(), std::begin(into.percentiles_ns), &Duration::count);
+    std::vector<plc_HistogramBar>& bars = bars_.emplace_back();
+    for (const auto& bar : digest.bars()) bars.push_back({.lower_ns = bar.lower.count(), .count = bar.count});
+    dds::lend(into.bars, bars);
   }
-  Histogram(const Histogram&) = delete;
-  Histogram& operator=(const Histogram&) = delete;
-
-  void put_into(plc_DurationHistogram& sample) {
-    sample.total = digest_.total();
-    static_assert(std::extent_v<decltype(sample.percentiles_ns)> == HistogramDigest::kFractions.size());
-    std::ranges::transform(digest_.percentiles(), std::begin(sample.percentiles_ns), &Duration::count);
-    dds::lend(sample.bars, std::span(bars_).first(digest_.bars().size()));
-  }
-  [[nodiscard]] const HistogramDigest& digest() const noexcept { return digest_; }
 
  private:
-  HistogramDigest digest_;
-  Bars bars_{};
+  std::vector<std::vector<plc_HistogramBar>> bars_;  // of each
 };
 
 std::uint32_t share_ppm(std::int64_t part, std::int64_t whole) noexcept {
@@ -108,18 +95,22 @@ bool StatisticsWriter::write(const std::string& instance, const InstancePageRead
   sample.epoch = epoch_;
   sample.digits = page.histogram_shape().digits();
   put_counters(counters, now, sample);
-  const auto read = [&](TaskHistogram which) { return page.histogram(index, which); };
-  Histogram latency(read(TaskHistogram::latency), counters.latency_min_ns, counters.latency_max_ns);
-  Histogram execution(read(TaskHistogram::execution), counters.exec_min_ns, counters.exec_max_ns);
-  Histogram negative(read(TaskHistogram::jitter_negative), 0, wrapping_difference(0, counters.jitter_min_ns));
-  Histogram positive(read(TaskHistogram::jitter_positive), 0, counters.jitter_max_ns);
-  Histogram release_jitter(latency.digest().above_least(
-      read(TaskHistogram::latency), Duration(counters.latency_min_ns), Duration(counters.latency_max_ns)));
-  latency.put_into(sample.latency_histogram);
-  execution.put_into(sample.execution_histogram);
-  release_jitter.put_into(sample.release_jitter_histogram);
-  negative.put_into(sample.jitter_negative_histogram);
-  positive.put_into(sample.jitter_positive_histogram);
+  const auto digest_of = [&](TaskHistogram which, std::int64_t least_ns, std::int64_t greatest_ns) {
+    return HistogramDigest(page.histogram(index, which), Duration(least_ns), Duration(greatest_ns));
+  };
+  const HistogramDigest latency =
+      digest_of(TaskHistogram::latency, counters.latency_min_ns, counters.latency_max_ns);
+  Histograms histograms;
+  histograms.put(sample.latency_histogram, latency);
+  histograms.put(sample.execution_histogram,
+                 digest_of(TaskHistogram::execution, counters.exec_min_ns, counters.exec_max_ns));
+  histograms.put(sample.release_jitter_histogram,
+                 latency.above_least(page.histogram(index, TaskHistogram::latency),
+                                     Duration(counters.latency_min_ns), Duration(counters.latency_max_ns)));
+  histograms.put(sample.jitter_negative_histogram, digest_of(TaskHistogram::jitter_negative, 0,
+                                                             wrapping_difference(0, counters.jitter_min_ns)));
+  histograms.put(sample.jitter_positive_histogram,
+                 digest_of(TaskHistogram::jitter_positive, 0, counters.jitter_max_ns));
   if (dds_write(way_.writer.get(), &sample) != DDS_RETCODE_OK) {
     refused_until_ = now + kPause;
     return true;
@@ -127,8 +118,8 @@ bool StatisticsWriter::write(const std::string& instance, const InstancePageRead
   told = {.task = std::string(task->identity.name.view()),
           .sequence = sequence,
           .since_ns = counters.since_ns,
-          .latency_p50 = latency.digest().percentiles()[0],
-          .latency_p99 = latency.digest().percentiles()[2]};
+          .latency_p50 = latency.percentiles()[0],
+          .latency_p99 = latency.percentiles()[2]};
   return true;
 }
 

@@ -10,6 +10,7 @@
 
 #include "api/client/control_client.hpp"
 #include "api/dds/ended_participant.h"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 #include "schedulers/tasks/task_recorder.hpp"
@@ -137,35 +138,37 @@ TEST(RemoteStatus, TellsTheStatisticsOfATaskAndAtOnceWhenTheyBeginAnew) {
   const auto report = sut->statistics("hosta", "line1", "Main", soon());
 
   ASSERT_TRUE(report) << report.error().describe();
-  EXPECT_EQ(report->numbers.cycles, 1000U);
-  EXPECT_EQ(report->numbers.digits, 3U);
-  EXPECT_EQ(report->numbers.slots_max, 1U);
-  EXPECT_GT(report->numbers.elapsed_ns, 0);
-  EXPECT_EQ(report->numbers.latency.min_ns, 1'000);
-  EXPECT_EQ(report->numbers.latency.max_ns, 50'000);
-  EXPECT_EQ(report->numbers.latency.average_ns, 1'490);
-  EXPECT_EQ(report->numbers.release_jitter.max_ns, 49'000);
-  EXPECT_EQ(report->release_jitter.total, 1000U);
-  EXPECT_EQ(report->release_jitter.percentiles_ns[0], 0);
-  EXPECT_EQ(report->release_jitter.percentiles_ns[4], 49'000);
-  EXPECT_EQ(report->numbers.last_loss.lost, 0U);
-  EXPECT_EQ(report->latency.total, 1000U);
-  EXPECT_EQ(report->latency.percentiles_ns[0], 1'000);
-  EXPECT_EQ(report->latency.percentiles_ns[3], 50'000);
-  ASSERT_EQ(report->latency.bars.size(), 2U);
-  EXPECT_EQ(report->latency.bars[0].count, 990U);
-  EXPECT_EQ(report->execution.percentiles_ns[4], 700);
-  EXPECT_EQ(report->numbers.period_jitter.min_ns, -49'000);
-  EXPECT_EQ(report->jitter_negative.total, 10U);
-  EXPECT_EQ(report->jitter_positive.total, 989U);
+  const plc_TaskStatistics& told = report->sample();
+  EXPECT_EQ(told.cycles, 1000U);
+  EXPECT_EQ(told.digits, 3U);
+  EXPECT_EQ(told.slots_max, 1U);
+  EXPECT_GT(told.elapsed_ns, 0);
+  EXPECT_EQ(told.latency.min_ns, 1'000);
+  EXPECT_EQ(told.latency.max_ns, 50'000);
+  EXPECT_EQ(told.latency.average_ns, 1'490);
+  EXPECT_EQ(told.release_jitter.max_ns, 49'000);
+  EXPECT_EQ(told.release_jitter_histogram.total, 1000U);
+  EXPECT_EQ(told.release_jitter_histogram.percentiles_ns[0], 0);
+  EXPECT_EQ(told.release_jitter_histogram.percentiles_ns[4], 49'000);
+  EXPECT_EQ(told.last_loss.lost, 0U);
+  EXPECT_EQ(told.latency_histogram.total, 1000U);
+  EXPECT_EQ(told.latency_histogram.percentiles_ns[0], 1'000);
+  EXPECT_EQ(told.latency_histogram.percentiles_ns[3], 50'000);
+  const auto bars = dds::parts_of(told.latency_histogram.bars);
+  ASSERT_EQ(bars.size(), 2U);
+  EXPECT_EQ(bars[0].count, 990U);
+  EXPECT_EQ(told.execution_histogram.percentiles_ns[4], 700);
+  EXPECT_EQ(told.period_jitter.min_ns, -49'000);
+  EXPECT_EQ(told.jitter_negative_histogram.total, 10U);
+  EXPECT_EQ(told.jitter_positive_histogram.total, 989U);
 
   ASSERT_TRUE(task.reset(TimePoint(seconds(9))));
   auto next = report;
-  while (next->numbers.recorded != 0) next = sut->statistics("hosta", "line1", "Main", soon());
-  EXPECT_EQ(next->numbers.cycles, 1000U);
-  EXPECT_EQ(next->latency.total, 0U);
-  EXPECT_TRUE(next->latency.bars.empty());
-  EXPECT_GE(next->numbers.since_unix_ns, report->numbers.since_unix_ns);
+  while (next->sample().recorded != 0) next = sut->statistics("hosta", "line1", "Main", soon());
+  EXPECT_EQ(next->sample().cycles, 1000U);
+  EXPECT_EQ(next->sample().latency_histogram.total, 0U);
+  EXPECT_TRUE(dds::parts_of(next->sample().latency_histogram.bars).empty());
+  EXPECT_GE(next->sample().since_unix_ns, told.since_unix_ns);
 }
 
 TEST(RemoteStatus, CountsChangesAndNoPresences) {
@@ -226,7 +229,7 @@ TEST(RemoteStatus, OfAPageThatAStrangerWroteToHarmsNobody) {
   TaskCounters wild{};
   std::memset(static_cast<void*>(&wild), 0x80, sizeof wild);
   page.statistics(0).counters.write(wild);
-  page.statistics(0).latency.record(milliseconds(1));
+  page.statistics(0)[TaskHistogram::latency].record(milliseconds(1));
   host.write_instance(0, "line1", InstanceState::running, 100);
   host.write_count(1);
   host.start_server();
@@ -234,7 +237,7 @@ TEST(RemoteStatus, OfAPageThatAStrangerWroteToHarmsNobody) {
   ASSERT_TRUE(sut->host("hosta", soon()));
   const auto report = sut->statistics("hosta", "line1", "Main", soon());
   ASSERT_TRUE(report) << report.error().describe();
-  EXPECT_EQ(report->numbers.cycles, 0x8080808080808080U);
+  EXPECT_EQ(report->sample().cycles, 0x8080808080808080U);
 }
 
 // DDS lets any writer dispose of another one's sample. A reader that has not taken the sample does not learn
@@ -379,7 +382,7 @@ TEST(RemoteStatus, OfStatisticsGoesOnAfterTheClientHasLostSightOfTheHost) {
   host.start_server();
   const auto sut = connect(domain);
   ASSERT_TRUE(sut->host("hosta", soon()));
-  ASSERT_EQ(sut->statistics("hosta", "line1", "Main", soon()).value().numbers.cycles, 1U);
+  ASSERT_EQ(sut->statistics("hosta", "line1", "Main", soon()).value().sample().cycles, 1U);
 
   ASSERT_NO_FATAL_FAILURE(lose_sight_of_hosts(*sut));
   run_cycle(1);
@@ -388,7 +391,7 @@ TEST(RemoteStatus, OfStatisticsGoesOnAfterTheClientHasLostSightOfTheHost) {
   for (const TimePoint end = soon(); cycles != 2 && MonotonicClock::now() < end;) {
     const auto report = sut->statistics("hosta", "line1", "Main", end);
     ASSERT_TRUE(report) << report.error().describe();
-    cycles = report->numbers.cycles;
+    cycles = report->sample().cycles;
     sut->wait_for_change(MonotonicClock::now() + milliseconds(20));
   }
   EXPECT_EQ(cycles, 2U);

@@ -2,24 +2,34 @@
 
 #include <algorithm>
 #include <array>
+#include <deque>
+#include <span>
 #include <sstream>
 
 #include <gmock/gmock.h>
 
 #include "api/cli/rows/statistics_rows.hpp"
+#include "api/client/statistics_cache.hpp"
+#include "api/dds/sequence.hpp"
 #include "shm/base/duration_histogram.hpp"
 
 namespace plchost {
 namespace {
 
+using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::IsSupersetOf;
 using testing::Not;
 
-HistogramReport of(std::vector<plc_HistogramBar> bars) {
-  HistogramReport report;
-  for (const auto& bar : bars) report.total += bar.count;
-  report.bars = std::move(bars);
-  return report;
+// The bars last until the program ends.
+plc_DurationHistogram of(std::vector<plc_HistogramBar> bars) {
+  static std::deque<std::vector<plc_HistogramBar>> kept;
+  plc_DurationHistogram histogram{};
+  for (const auto& bar : bars) histogram.total += bar.count;
+  dds::lend(histogram.bars, kept.emplace_back(std::move(bars)));
+  return histogram;
 }
 
 /// As a terminal counts: UTF-8's continuation bytes have no width.
@@ -106,20 +116,20 @@ TEST(ShortDuration, HasThreeDigitsAndAUnit) {
 }
 
 TEST(StatisticsRows, GiveEveryNumberToPrograms) {
-  StatisticsReport report;
-  report.numbers.cycles = 12;
-  report.numbers.recorded = 7;
-  report.numbers.lost_consecutive_max = 3;
-  report.numbers.spin_ppm = 65'000;
-  report.numbers.latency = {1'000, 500, 9'000, 2'500};
-  report.latency = of({{960, 7}});
-  report.latency.percentiles_ns = {1'000, 2'000, 3'000, 4'000, 5'000};
-  report.numbers.last_loss = {.lost = 2,
-                              .release_unix_ns = 1'700'000'000'000'000'000,
-                              .start_unix_ns = 1'700'000'000'000'001'500,
-                              .end_unix_ns = 1'700'000'000'002'000'000};
+  plc_TaskStatistics sample{};
+  sample.cycles = 12;
+  sample.recorded = 7;
+  sample.lost_consecutive_max = 3;
+  sample.spin_ppm = 65'000;
+  sample.latency = {1'000, 500, 9'000, 2'500};
+  sample.latency_histogram = of({{960, 7}});
+  std::ranges::copy(std::array{1'000, 2'000, 3'000, 4'000, 5'000}, sample.latency_histogram.percentiles_ns);
+  sample.last_loss = {.lost = 2,
+                      .release_unix_ns = 1'700'000'000'000'000'000,
+                      .start_unix_ns = 1'700'000'000'000'001'500,
+                      .end_unix_ns = 1'700'000'000'002'000'000};
   Row row;
-  add_statistics(row, report);
+  add_statistics(row, sample);
   EXPECT_EQ(row["last_loss_cycles"], 2);
   EXPECT_EQ(row["last_loss_release"], "2023-11-14T22:13:20.000Z");
   EXPECT_EQ(row["last_loss_start_us"], 1.5);
@@ -143,14 +153,69 @@ TEST(StatisticsRows, GiveEveryNumberToPrograms) {
 }
 
 TEST(StatisticsRows, ShowPeopleJitterOnlyWhereThereIsSome) {
-  StatisticsReport report;
-  report.latency = of({{960, 7}});
-  EXPECT_THAT(format_statistics(report, {}), Not(HasSubstr("period jitter")));
-  EXPECT_THAT(format_statistics(report, {}), Not(HasSubstr("last_loss")));
-  report.numbers.last_loss.lost = 1;
-  EXPECT_THAT(format_statistics(report, {}), HasSubstr("last_loss_release"));
-  report.jitter_negative = of({{10, 1}});
-  EXPECT_THAT(format_statistics(report, {}), HasSubstr("period jitter"));
+  plc_TaskStatistics sample{};
+  sample.latency_histogram = of({{960, 7}});
+  EXPECT_THAT(format_statistics(sample, {}), Not(HasSubstr("period jitter")));
+  EXPECT_THAT(format_statistics(sample, {}), Not(HasSubstr("last_loss")));
+  sample.last_loss.lost = 1;
+  EXPECT_THAT(format_statistics(sample, {}), HasSubstr("last_loss_release"));
+  sample.jitter_negative_histogram = of({{10, 1}});
+  EXPECT_THAT(format_statistics(sample, {}), HasSubstr("period jitter"));
+}
+
+std::vector<std::string> fields_of(const plc_TaskStatistics& sample) {
+  Row row;
+  add_statistics(row, sample);
+  std::vector<std::string> fields;
+  for (const auto& [field, value] : row.items()) fields.push_back(field);
+  return fields;
+}
+
+// Programs go by the names, and a table of comma-separated values by their order, too.
+TEST(StatisticsRows, HaveTheFieldsOfEachHistogramBehindThoseOfItsSummary) {
+  const std::vector<std::string> all = fields_of({});
+  std::vector<std::string> quantities(std::ranges::find(all, "latency_last_us"), all.end());
+  std::erase_if(quantities, [](const std::string& field) {
+    return !field.ends_with("_max_us") && !field.ends_with("_p50_us") && !field.ends_with("_histogram");
+  });
+  EXPECT_THAT(quantities,
+              ElementsAre("latency_max_us", "latency_p50_us", "latency_histogram", "exec_max_us",
+                          "exec_p50_us", "exec_histogram", "release_jitter_max_us", "release_jitter_p50_us",
+                          "release_jitter_histogram", "period_jitter_max_us", "period_jitter_negative_p50_us",
+                          "period_jitter_negative_histogram", "period_jitter_positive_p50_us",
+                          "period_jitter_positive_histogram"));
+}
+
+TEST(StatisticsRows, ShowPeopleEachQuantityAndADrawingOfEachShape) {
+  plc_TaskStatistics sample{};
+  sample.jitter_positive_histogram = sample.latency_histogram = of({{960, 7}});
+  std::vector<std::string> titles;
+  for (const std::string& line : lines(format_statistics(sample, {}))) {
+    const std::size_t end = line.starts_with("  ") ? line.find("  ", 2) : line.find("  ");
+    if (!line.empty() && line.find('|') == std::string::npos) titles.push_back(line.substr(0, end));
+  }
+  EXPECT_THAT(titles,
+              IsSupersetOf({"latency", "execution", "release jitter", "period jitter", "  too short by",
+                            "  too long by", "latency: planned release to start", "execution: start to end",
+                            "period jitter: start to start, against the planned distance"}));
+  EXPECT_THAT(titles, Not(Contains(HasSubstr("release jitter:")))) << "it is the latency, moved";
+}
+
+TEST(StatisticsReport, HoldsTheBarsOfItsSampleAndSharesThemWithItsCopies) {
+  std::vector<plc_HistogramBar> lent{{1, 2}, {3, 4}};
+  plc_TaskStatistics sample{};
+  dds::lend(sample.latency_histogram.bars, lent);
+  dds::lend(sample.jitter_positive_histogram.bars, std::span(lent).subspan(1));
+  const auto copy = [&] { return StatisticsReport(StatisticsReport(sample)); }();
+  lent.assign(2, {});
+  const auto counts = [](const plc_DurationHistogram& histogram) {
+    std::vector<std::uint64_t> all;
+    for (const auto& bar : dds::parts_of(histogram.bars)) all.push_back(bar.count);
+    return all;
+  };
+  EXPECT_THAT(counts(copy.sample().latency_histogram), ElementsAre(2U, 4U));
+  EXPECT_THAT(counts(copy.sample().jitter_positive_histogram), ElementsAre(4U));
+  EXPECT_THAT(counts(copy.sample().execution_histogram), IsEmpty());
 }
 
 }  // namespace

@@ -199,7 +199,7 @@ TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
   TaskCounters counters{};
   counters.cycles = 11;
   slot.counters.write(counters);
-  writer->statistics(1).latency.record(Duration(20));
+  writer->statistics(1)[TaskHistogram::latency].record(Duration(20));
   EXPECT_NE(sut->task_sequence(1), before);
   EXPECT_EQ(sut->task_count(), 3U);
   EXPECT_EQ(sut->runtime()->pid, 7);
@@ -298,8 +298,8 @@ TEST_F(Pages, HistogramsAreFineUpTo64TasksAndCoarseBeyond) {
     ASSERT_TRUE(sut) << sut.error().describe();
     EXPECT_EQ(sut->histogram_shape().digits(), digits);
     for (std::uint32_t i = 0; i < count; ++i) {
-      writer->statistics(i).latency.record(Duration(i));
-      writer->statistics(i).jitter_positive.record(Duration::max());
+      writer->statistics(i)[TaskHistogram::latency].record(Duration(i));
+      writer->statistics(i)[TaskHistogram::jitter_positive].record(Duration::max());
     }
     for (std::uint32_t i = 0; i < count; ++i) {
       const auto total = [&](TaskHistogram which) { return sut->histogram(i, which).total(); };

@@ -17,6 +17,8 @@ constexpr TimePoint kFirstRelease{seconds(100)};
 
 class Recorder : public testing::Test {
  protected:
+  using enum TaskHistogram;
+
   static constexpr Duration kInterval = milliseconds(10);
 
   /// Waits for a writer that was taken off its processor in the middle.
@@ -52,8 +54,8 @@ TEST_F(Recorder, LatencyHasLastLeastGreatestAndSum) {
   EXPECT_EQ(read().latency_min_ns, 10'000);
   EXPECT_EQ(read().latency_max_ns, 70'000);
   EXPECT_EQ(average(read().latency_sum_ns, read().recorded), 110'000 / 3);
-  EXPECT_EQ(statistics_.latency.total(), 3U);
-  EXPECT_EQ(statistics_.latency.count(statistics_.latency.shape().index_of(microseconds(70))), 1U);
+  EXPECT_EQ(statistics_[latency].total(), 3U);
+  EXPECT_EQ(statistics_[latency].count(statistics_[latency].shape().index_of(microseconds(70))), 1U);
 }
 
 TEST_F(Recorder, ExecutionHasLastLeastGreatestAndSum) {
@@ -62,7 +64,7 @@ TEST_F(Recorder, ExecutionHasLastLeastGreatestAndSum) {
   EXPECT_EQ(read().exec_min_ns, 1'000);
   EXPECT_EQ(read().exec_max_ns, 7'000);
   EXPECT_EQ(read().exec_sum_ns, 11'000);
-  EXPECT_EQ(statistics_.execution.total(), 3U);
+  EXPECT_EQ(statistics_[execution].total(), 3U);
 }
 
 TEST_F(Recorder, PeriodJitterLiesInOneHistogramForEachSign) {
@@ -75,10 +77,10 @@ TEST_F(Recorder, PeriodJitterLiesInOneHistogramForEachSign) {
   EXPECT_EQ(read().jitter_max_ns, 20'000);
   EXPECT_EQ(read().jitter_sum_ns, -20'000);
   EXPECT_EQ(largest_jitter_ns(read()), 40'000);
-  EXPECT_EQ(statistics_.jitter_negative.total(), 1U);
-  EXPECT_EQ(statistics_.jitter_negative.count(statistics_.latency.shape().index_of(microseconds(40))), 1U);
-  EXPECT_EQ(statistics_.jitter_positive.total(), 2U);
-  EXPECT_EQ(statistics_.jitter_positive.count(0), 1U) << "no deviation";
+  EXPECT_EQ(statistics_[jitter_negative].total(), 1U);
+  EXPECT_EQ(statistics_[jitter_negative].count(statistics_[latency].shape().index_of(microseconds(40))), 1U);
+  EXPECT_EQ(statistics_[jitter_positive].total(), 2U);
+  EXPECT_EQ(statistics_[jitter_positive].count(0), 1U) << "no deviation";
 }
 
 TEST_F(Recorder, TellsForWhichPostTheLastCycleWasAlsoAfterAReset) {
@@ -115,7 +117,7 @@ TEST_F(Recorder, OnlyCyclicTasksHaveJitterAndSlots) {
   }
   EXPECT_EQ(read().periods, 0U);
   EXPECT_EQ(read().slots_max, 0U);
-  EXPECT_EQ(statistics_.jitter_negative.total() + statistics_.jitter_positive.total(), 0U);
+  EXPECT_EQ(statistics_[jitter_negative].total() + statistics_[jitter_positive].total(), 0U);
 }
 
 TEST_F(Recorder, TheTimeBeforeBeginIsNoPeriod) {
@@ -198,9 +200,8 @@ TEST_F(Recorder, ResetBeginsAllAnewButTheCycleCountAndTheInterval) {
     return std::memcmp(&now, &expected, sizeof now) == 0;
   };
   EXPECT_TRUE(is_fresh(5)) << "at once, also while the task is parked";
-  for (const auto* histogram : {&statistics_.latency, &statistics_.execution, &statistics_.jitter_negative,
-                                &statistics_.jitter_positive}) {
-    EXPECT_EQ(histogram->total(), 0U);
+  for (const DurationHistogram& histogram : statistics_.histograms) {
+    EXPECT_EQ(histogram.total(), 0U);
   }
   sut_.record(cycle(6, microseconds(3)));
   EXPECT_EQ(read().cycles, 6U);
@@ -232,14 +233,14 @@ TEST_F(Recorder, ResetWhileItRecordsLeavesNothingOfBefore) {
     while (!sut_.reset(kFirstRelease + seconds(i))) std::this_thread::yield();
     for (const std::uint64_t now = read().cycles; read().cycles < now + 2;) std::this_thread::yield();
     EXPECT_EQ(read().latency_min_ns, 100'000 * (i + 1));
-    EXPECT_EQ(statistics_.latency.percentile(0), statistics_.latency.percentile(1.0));
+    EXPECT_EQ(statistics_[latency].percentile(0), statistics_[latency].percentile(1.0));
   }
   stop = true;
   task.join();
   const std::uint64_t recorded = read().recorded;
-  EXPECT_EQ(statistics_.latency.total(), recorded) << "scalars and buckets tell of the same cycles";
-  EXPECT_EQ(statistics_.execution.total(), recorded);
-  EXPECT_EQ(statistics_.jitter_negative.total() + statistics_.jitter_positive.total(), read().periods);
+  EXPECT_EQ(statistics_[latency].total(), recorded) << "scalars and buckets tell of the same cycles";
+  EXPECT_EQ(statistics_[execution].total(), recorded);
+  EXPECT_EQ(statistics_[jitter_negative].total() + statistics_[jitter_positive].total(), read().periods);
   EXPECT_EQ(read().cycles, sut_.counters().cycles);
   EXPECT_EQ(sut_.counters().cycles,
             static_cast<std::uint64_t>(read().release_ns - kFirstRelease.time_since_epoch().count()) /

@@ -56,7 +56,7 @@ TEST_F(TaskTest, LatencyIsStartMinusPlannedRelease) {
   EXPECT_EQ(counters().latency_last_ns, 10'000);
   EXPECT_EQ(counters().latency_max_ns, 70'000);
   EXPECT_EQ(TimePoint(Duration(counters().release_ns)), origin + milliseconds(20));
-  EXPECT_EQ(statistics.latency.total(), 3U);
+  EXPECT_EQ(statistics[TaskHistogram::latency].total(), 3U);
 }
 
 TEST_F(TaskTest, PeriodJitterIsSigned) {
