@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "api/client/at_once.hpp"
+#include "api/cli/at_once.hpp"
 #include "api/dds/object_query.hpp"
 
 namespace plchost {

@@ -17,7 +17,7 @@ namespace {
 using Capabilities = std::array<std::uint32_t, _LINUX_CAPABILITY_U32S_3>;
 
 // The system calls: libcap would be a dependency of each instance.
-Result<void> take_away(const Capabilities& given_up) {
+Result<void> renounce(const Capabilities& given_up) {
   __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
   std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> rights{};
   PLCHOST_TRY(check_errno(::syscall(SYS_capget, &header, rights.data()), "cannot read the capabilities"));
@@ -36,11 +36,11 @@ Result<void> give_up_capabilities(std::initializer_list<unsigned> given_up) {
   constexpr unsigned kBits = 32;
   Capabilities bits{};
   for (const unsigned one : given_up) bits.at(one / kBits) |= std::uint32_t{1} << (one % kBits);
-  return take_away(bits);
+  return renounce(bits);
 }
 
 Result<void> give_up_all_capabilities() {
-  return take_away({UINT32_MAX, UINT32_MAX});
+  return renounce({UINT32_MAX, UINT32_MAX});
 }
 
 bool never_gains_rights() noexcept {

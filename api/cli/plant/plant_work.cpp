@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "api/cli/at_once.hpp"
 #include "api/cli/cli_session.hpp"
 #include "api/cli/plant/plant_changes.hpp"
-#include "api/client/at_once.hpp"
 #include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
 

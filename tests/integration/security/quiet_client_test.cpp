@@ -26,9 +26,9 @@ TEST_F(QuietClient, AsksTheHostForNothingAgainAndAgain) {
   const int before = wire.sent();
   std::this_thread::sleep_for(std::chrono::seconds(3));
   const int sent = wire.sent() - before;
-  const double seconds = std::chrono::duration<double>(MonotonicClock::now() - began).count();
-  fmt::print("{} datagrams in {:.1f} s\n", sent, seconds);
-  EXPECT_LT(sent, kMost * seconds);
+  const double passed_s = std::chrono::duration<double>(MonotonicClock::now() - began).count();
+  fmt::print("{} datagrams in {:.1f} s\n", sent, passed_s);
+  EXPECT_LT(sent, kMost * passed_s);
 }
 
 }  // namespace

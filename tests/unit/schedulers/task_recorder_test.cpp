@@ -70,7 +70,7 @@ TEST_F(Recorder, ExecutionHasLastLeastGreatestAndSum) {
 TEST_F(Recorder, PeriodJitterLiesInOneHistogramForEachSign) {
   const Duration latencies[] = {microseconds(50), microseconds(10), microseconds(30), microseconds(30)};
   int n = 0;
-  for (const Duration latency : latencies) sut_.record(cycle(n++, latency));
+  for (const Duration late : latencies) sut_.record(cycle(n++, late));
   EXPECT_EQ(read().periods, 3U) << "four starts are three periods";
   EXPECT_EQ(read().jitter_last_ns, 0);
   EXPECT_EQ(read().jitter_min_ns, -40'000);
@@ -128,8 +128,8 @@ TEST_F(Recorder, TheTimeBeforeBeginIsNoPeriod) {
 }
 
 TEST_F(Recorder, SlotsAreThePeriodsThatACycleTouched) {
-  auto slots = [&, n = 0](Duration latency, Duration execution) mutable {
-    sut_.record(cycle(n++, latency, execution));
+  auto slots = [&, n = 0](Duration late, Duration busy) mutable {
+    sut_.record(cycle(n++, late, busy));
     return read().slots_last;
   };
   EXPECT_EQ(slots({}, Duration::zero()), 1U);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <optional>
 
 #include "shm/base/time.hpp"
 
@@ -20,21 +19,20 @@ class PollSchedule {
         pause_(pause),
         next_(first) {}
 
-  [[nodiscard]] TimePoint next() const noexcept { return retry_.value_or(next_); }
+  [[nodiscard]] TimePoint next() const noexcept { return is_beside_grid_ ? retry_ : next_; }
   /// Of the polls that were due while another one was under way.
   [[nodiscard]] std::uint64_t skipped() const noexcept { return skipped_; }
 
   void answered(TimePoint now) noexcept {
     pause_ = first_pause_;
-    retry_.reset();
+    is_beside_grid_ = false;
     skipped_ += step_beyond(now) - 1;
   }
   void failed(TimePoint now) noexcept {
-    const TimePoint retry = now + pause_;
-    (void)step_beyond(retry);
-    retry_.reset();
-    if (pause_ < interval_) {
-      retry_ = retry;
+    retry_ = now + pause_;
+    (void)step_beyond(retry_);
+    is_beside_grid_ = pause_ < interval_;
+    if (is_beside_grid_) {
       next_ -= interval_;  // the time of the grid before it, from which the next one is counted
     }
     pause_ = std::min(pause_ * 2, longest_pause_);
@@ -54,7 +52,8 @@ class PollSchedule {
   Duration longest_pause_;
   Duration pause_;
   TimePoint next_;
-  std::optional<TimePoint> retry_;  ///< beside the grid
+  TimePoint retry_;  ///< after the last failure
+  bool is_beside_grid_ = false;
   std::uint64_t skipped_ = 0;
 };
 
