@@ -8,8 +8,9 @@ One process runs one case after the other. If a case ends the process or exceeds
 next process continues with the case after it. If a process fails although none of its cases did (a leak), each of them
 runs again in a process of its own. A process that a case leaves running is a failure, too.
 --share    which cases: each N-th one, from the I-th one on (0 to N-1); GTEST_FILTER chooses among all, as usual
---results  one line per case: result (passed, failed, skipped or retried), seconds and name, separated by tabs
---retries  the tests that may run a second time if they fail (tests/retries.txt)
+--results  one line per case, separated by tabs: result, seconds, seconds of the stall that excuses its first run, and name.
+           Results are passed, failed, skipped and retried
+--retries  the tests that may run a second time if they fail (tests/retries.txt). Stalls of the machine are read from $PLCHOST_STALLS
 --skips    a list of tests (tests/skips.txt). A case is skipped without being run if its reason there begins with "not run:"
 --without  cases that run elsewhere, names with * and ?, separated by colons
 --kind     of the build, for these lists: plain, address or thread
@@ -28,14 +29,16 @@ import subprocess
 import sys
 import tempfile
 import time
+import typing
 
-from expected import UNLISTED, Expected
+from expected import Expected
+from stalls import ENVIRONMENT, SETTLED, STALLED, longest_stall, milliseconds
 
 EVENT = re.compile(rb"\[( RUN      |       OK |  FAILED  |  SKIPPED )\] ([\w./]+)")
 RESULTS = {b"       OK ": "passed", b"  FAILED  ": "failed", b"  SKIPPED ": "skipped"}
 PR_SET_PDEATHSIG = 1
 # tests/run.sh leaves this out of processes that run one case. One that runs many of them pays for it once.
-ENVIRONMENT = {**os.environ, "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":detect_stack_use_after_return=1"}
+OF_CASES = {**os.environ, "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":detect_stack_use_after_return=1"}
 
 
 def list_cases(program):
@@ -73,12 +76,19 @@ def members(group):
     return found
 
 
+class Result(typing.NamedTuple):
+    word: str
+    began: float
+    ended: float
+    output: str
+
+
 class Run:
     """One process, and what it has said about its cases."""
 
     def __init__(self, program, cases, limit):
         self.cases, self.limit = cases, limit
-        self.results = {}  # case: (result, seconds, output)
+        self.results = {}
         self.current, self.began = None, time.monotonic()
         self.output, self.line = [], b""
         self.trouble = ""
@@ -86,7 +96,7 @@ class Run:
             flags.write("--gtest_filter=" + ":".join(cases) + "\n")
             flags.flush()
             self.process = subprocess.Popen(
-                [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"], env=ENVIRONMENT,
+                [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"], env=OF_CASES,
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=functools.partial(follow, os.getpid()))
             try:
                 self.watch()
@@ -116,10 +126,10 @@ class Run:
         if not self.trouble and (self.current or code != (1 if self.failed() else 0)):
             self.trouble = "ended its process " + (f"by signal {-code}" if code < 0 else f"with exit code {code}")
         if self.current:
-            self.results[self.current] = ("failed", time.monotonic() - self.began, self.text())
+            self.results[self.current] = Result("failed", self.began, time.monotonic(), self.text())
 
     def failed(self):
-        return [case for case, result in self.results.items() if result[0] == "failed"]
+        return [case for case, result in self.results.items() if result.word == "failed"]
 
     def text(self):
         return b"".join([*self.output, self.line]).decode(errors="replace")
@@ -138,12 +148,11 @@ class Run:
         found = EVENT.search(line)
         name = found.group(2).decode() if found else ""
         if found and found.group(1) == b" RUN      " and name in self.cases:
-            self.current, self.began, self.output = name, time.monotonic(), [line]
+            self.current, self.output = name, [line]  # it began when the one before it ended: this line may be read late
             return
         self.output.append(line)
         if found and name == self.current and found.group(1) in RESULTS:
-            seconds = time.monotonic() - self.began
-            self.results[name] = (RESULTS[found.group(1)], seconds, self.text())
+            self.results[name] = Result(RESULTS[found.group(1)], self.began, time.monotonic(), self.text())
             self.current, self.began, self.output = None, time.monotonic(), []
 
     def end_group(self):
@@ -178,25 +187,34 @@ class Share:
             if run.trouble and run.current:
                 print(f"FAILED: {run.current} {run.trouble}")
             elif run.trouble:
-                sound = [case for case in run.cases if run.results.get(case, ("passed",))[0] != "failed"]
+                sound = [case for case in run.cases if case not in run.failed()]
                 print(f"the process {run.trouble}, without a word of which case: each of {len(sound)} runs alone")
                 self.find_the_guilty(sound, run)
             for case in left if not run.trouble else []:
-                self.results.setdefault(case, ("failed", 0.0, "it did not run"))
+                self.results.setdefault(case, Result("failed", 0, 0, "it did not run"))
             left = [case for case in left if case not in self.results]
 
     def find_the_guilty(self, cases, run):
         guilty = False
         for case in cases:
             alone = Run(self.program, [case], self.limit)
-            self.results[case] = alone.results.get(case, ("failed", 0.0, ""))
+            self.results[case] = alone.results.get(case, Result("failed", 0, 0, ""))
             if alone.trouble:
                 guilty = True
-                self.results[case] = ("failed", self.results[case][1], alone.text())
+                self.results[case] = self.results[case]._replace(word="failed", output=alone.text())
                 print(f"FAILED: {case} {alone.trouble}")
         if cases and not guilty:
             print(f"each of them succeeds alone: the last one, {cases[-1]}, stands for them")
-            self.results[cases[-1]] = ("failed", 0.0, run.text())
+            self.results[cases[-1]] = self.results[cases[-1]]._replace(word="failed", output=run.text())
+
+
+def stalls_of(results):
+    """The longest stall of the machine during each of these cases; those without one are left out."""
+    file = pathlib.Path(os.environ.get(ENVIRONMENT, os.devnull))
+    if results:
+        time.sleep(SETTLED)
+    longest = {case: longest_stall(file, result.began, result.ended) for case, result in results.items()}
+    return {case: seconds for case, seconds in longest.items() if seconds}
 
 
 def main():
@@ -219,27 +237,29 @@ def main():
     left_out = {case: skips.reason(case, "not run:") for case in cases if skips.reason(case, "not run:")}
     work = Share(options.program, options.limit)
     work.run([case for case in cases if case not in left_out])
-    work.results.update({case: ("skipped", 0.0, reason) for case, reason in left_out.items()})
+    work.results.update({case: Result("skipped", 0, 0, reason) for case, reason in left_out.items()})
 
     retries = Expected(options.retries, options.kind)
-    failed = [case for case, result in work.results.items() if result[0] == "failed"]
-    unlisted = [case for case in failed if not retries.second_run(case)]
-    for case in [case for case in failed if case not in unlisted or len(unlisted) <= UNLISTED]:
-        print(f"again: {case}\n{work.results[case][2]}")
+    failed = [case for case, result in work.results.items() if result.word == "failed"]
+    stalled = stalls_of({case: work.results[case] for case in failed if not retries.second_run(case) and retries.may_stall(case)})
+    for case in failed:
+        if not (retries.second_run(case) or (case in stalled and len(stalled) <= STALLED)):
+            continue
+        print(f"again: {case}{f', as the machine stood still for {milliseconds(stalled[case])}' if case in stalled else ''}\n{work.results[case].output}")
         second = Share(options.program, options.limit)
         second.run([case])
-        if second.results[case][0] == "passed":
-            work.results[case] = ("retried", *second.results[case][1:])
+        if second.results[case].word == "passed":
+            work.results[case] = second.results[case]._replace(word="retried")
 
     if options.results:
         with open(options.results, "w", encoding="utf-8") as file:
-            for case, (result, seconds, _) in work.results.items():
-                file.write(f"{result}\t{seconds:.3f}\t{case}\n")
-    for _, _, output in work.results.values():
-        print(*(line + "\n" for line in output.splitlines() if line.startswith("further round: ")), sep="", end="")
-    failed = [case for case, result in work.results.items() if result[0] == "failed"]
+            for case, result in work.results.items():
+                file.write(f"{result.word}\t{result.ended - result.began:.3f}\t{stalled.get(case, 0):.3f}\t{case}\n")
+    for result in work.results.values():
+        print(*(line + "\n" for line in result.output.splitlines() if line.startswith("further round: ")), sep="", end="")
+    failed = [case for case, result in work.results.items() if result.word == "failed"]
     for case in failed:
-        print(f"---- {case}\n{work.results[case][2]}")
+        print(f"---- {case}\n{work.results[case].output}")
     for case in failed:
         print(f"FAILED: {case}")
     print(f"{len(work.results) - len(failed)} of {len(cases)} cases passed")

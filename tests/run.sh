@@ -4,9 +4,10 @@
 #   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
 #   tests/run.sh NAME...   only tests whose name matches one of these (ctest -R), in the plain build
 #   tests/run.sh --help    this text
-# A test has one attempt, unless tests/retries.txt says why it has two; up to three others of a build have two as well. Each second
-# run, each further round within a test and each skipped test is printed at the end. One that is skipped and not listed in
-# tests/skips.txt fails the run.
+# A test has one attempt, unless tests/retries.txt says why it has two. Up to three others of a build have two if the machine stood
+# still while they ran. The end of the log names each second run, each further round within a test, and each test that was skipped or
+# left out by a build. It says how long the machine stood still. A test that is skipped or left out and not listed in tests/skips.txt
+# fails the run.
 # Each step says how long it took, and the seconds of all processors together.
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -165,7 +166,7 @@ count() { # adds up the summary of the step that just ran
   summary=$(grep -E '^[0-9]+ passed, [0-9]+ failed' "$log" | tail -n 1)
   passed=$((passed + $(cut -d' ' -f1 <<<"${summary:-0}")))
   failed=$((failed + $(cut -d' ' -f3 <<<"${summary:-0 - 0}")))
-  grep -E '^(skipped|second run|further round): ' "$log" >>"$notes" || true
+  grep -E '^(skipped|left out|second run|further round|stalls): ' "$log" >>"$notes" || true
 }
 
 # Over the product's code; the tests are compiled with all warnings as errors like everything else.
@@ -227,7 +228,7 @@ case "${1:-}" in
     join build_asan "address and undefined sanitizers: build"
     run "address and undefined sanitizers: tests" tests .build/asan "${whole[@]}"
     count
-    # Of the integration tests only those of the API and of Modbus (tests/README.md).
+    # Of the integration tests only those of the API and of Modbus (tests/README.md, tests/skips.txt).
     join build_tsan "thread sanitizer: build"
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count

@@ -3,11 +3,12 @@
 
 Usage: suite.py [--jobs N] BUILD [CTEST_OPTION...]
 
-A test that fails runs again if tests/retries.txt names it, and so do a few others, each of which is printed with what it said
-at first. More than a few fail the run. A test that is skipped although tests/skips.txt does not name it fails the run, and so
-does one that needed a further round without being listed. So does a case of a test program that ctest does not have exactly
-once, and so does a line of these two lists that matches no test. Shares of whole programs (cases.py) count with each of their
-cases. The last lines name the tests that took most processor time.
+A test that fails runs again if tests/retries.txt names it, or if the machine stood still while it ran (stalls.py). The latter is
+printed with what it said at first. More than three of these fail the run. A test that is skipped or left out by the build
+fails the run if tests/skips.txt does not name it. So does one that needed a further round without being listed. So does a case
+of a test program that ctest does not have exactly once, and so does a line of these two lists that matches no test. Shares of
+whole programs (cases.py) count with each of their cases. The last lines name the tests that took most processor time, and say how
+long the machine stood still.
 """
 
 import argparse
@@ -16,12 +17,15 @@ import pathlib
 import re
 import subprocess
 import sys
+import threading
 import time
 import xml.etree.ElementTree as ElementTree
 
 from cases import list_cases
-from expected import UNLISTED, Expected
+from expected import LEFT_OUT, Expected
 from processor_time import ProcessorTime
+from stalls import SETTLED, STALLED, Stalls, longest_stall, milliseconds
+from when_run import WhenRun
 
 OUTPUT_LINES = 40  # of a failed case, repeated at the end
 # A test that measures time may have rounds of its own. It says so in its output at each round after the first.
@@ -38,13 +42,15 @@ def kind_of(build):
 
 
 class Suite:
-    def __init__(self, build, jobs, options):
-        self.build, self.jobs, self.options = build, jobs, options
+    def __init__(self, build, jobs, options, stalls):
+        self.build, self.jobs, self.options, self.stalls = build, jobs, options, stalls
         self.shares = build / "Testing" / "shares"
         self.outputs = {}  # of what failed in its last run
         self.first_outputs = {}  # of what failed in its first one
         self.rounds = []  # further ones: test and reason
         self.seconds = {}  # of processors, by test
+        self.ran = {}  # when it began and ended in its first run, by test
+        self.stalled_cases = {}  # of shares, that ran again because of a stall: its seconds
 
     def run(self):
         """The result of each test and case; None: ctest ran none."""
@@ -63,11 +69,15 @@ class Suite:
         # Alone: the first ctest after a build finds the cases of each program, and writes them into files.
         commands = dict(self.listed(options))
         with subprocess.Popen(["ctest", "--test-dir", self.build, "--output-on-failure", "-j", str(self.jobs), "--no-tests=error",
-                               "--test-output-size-passed", "65536", "--output-junit", file, *options]) as process:
-            times = ProcessorTime(process.pid, commands)
+                               "--test-output-size-passed", "65536", "--output-junit", file, *options], stdout=subprocess.PIPE) as process:
+            times, when = ProcessorTime(process.pid, commands), WhenRun(commands)
+            said = threading.Thread(target=when.follow, args=(process.stdout, sys.stdout.buffer))
+            said.start()
             while process.poll() is None:
                 times.look()
                 time.sleep(0.2)
+            said.join()
+        self.ran = {**when.ran, **self.ran}
         for name, seconds in times.seconds().items():
             self.seconds[name] = max(seconds, self.seconds.get(name, 0))
         if not file.exists():
@@ -121,9 +131,14 @@ class Suite:
         return sorted(wrong)
 
     def of_no_test(self, *lists):
-        """Lines that name no test of this build, be it chosen for this run or not."""
+        """Lines that name no test of this build, be it chosen for this run or not, and nothing that it leaves out."""
         names = [name for name, _ in self.listed([])]
-        return [line for entries in lists for line in entries.of_no_test(names)]
+        return [line for entries in lists for line in entries.of_no_test(names, self.left_out())]
+
+    def left_out(self):
+        """Tests and folders of tests that the build does not have (plchost_left_out in CMakeLists.txt)."""
+        file = self.build / "tests" / "left_out.txt"
+        return file.read_text(encoding="utf-8").split() if file.exists() else []
 
     def print_costly(self):
         """Of all tests to a file, of the first to standard output."""
@@ -136,8 +151,16 @@ class Suite:
         file = self.shares / f"{share}.txt"
         if not file.exists():
             return {}
-        lines = (line.split("\t") for line in file.read_text(encoding="utf-8").splitlines())
-        return {case: result for result, _, case in lines}
+        lines = [line.split("\t") for line in file.read_text(encoding="utf-8").splitlines()]
+        self.stalled_cases.update({case: float(stall) for result, _, stall, case in lines if result == "retried" and float(stall)})
+        return {case: result for result, _, _, case in lines}
+
+    def stalls_of(self, names):
+        """The longest stall of the machine during the first run of each of these; those without one are left out."""
+        if names:
+            time.sleep(SETTLED)
+        longest = {name: longest_stall(self.stalls.file, *self.ran[name]) for name in names if name in self.ran}
+        return {name: seconds for name, seconds in longest.items() if seconds}
 
 
 def shortened(lines):
@@ -166,7 +189,7 @@ def skipped(names, skips):
     """Each test and its reason; those of one suite that are not run are one line."""
     lines = {}
     for name in names:
-        reason = skips.reason(name) or "NOT EXPECTED (tests/skips.txt)"
+        reason = skips.skipped(name) or "NOT EXPECTED (tests/skips.txt)"
         suite = name.split(".")[0] if reason.startswith("not run:") else name
         lines.setdefault((suite, reason), []).append(name)
     return [(cases[0] if len(cases) == 1 else f"{suite}, {len(cases)} cases", reason) for (suite, reason), cases in lines.items()]
@@ -177,48 +200,61 @@ def main():
     parser.add_argument("--jobs", type=int, default=4)
     parser.add_argument("build", type=pathlib.Path)
     options, for_ctest = parser.parse_known_args()
-    kind = kind_of(options.build)
-    retries, skips = Expected(HERE / "retries.txt", kind), Expected(HERE / "skips.txt", kind)
+    (options.build / "Testing").mkdir(exist_ok=True)
+    with Stalls(options.build / "Testing" / "stalls.txt") as stalls:
+        return run(Suite(options.build, options.jobs, for_ctest, stalls))
 
-    suite = Suite(options.build, options.jobs, for_ctest)
+
+def run(suite):
+    kind = kind_of(suite.build)
+    retries, skips = Expected(HERE / "retries.txt", kind), Expected(HERE / "skips.txt", kind)
     results = suite.run()
     if results is None:
         return 1
     failed_once = [name for name, result in results.items() if result == "failed"]
-    others = [name for name in failed_once if not retries.second_run(name)]
-    again = [name for name in failed_once if name not in others or len(others) <= UNLISTED]
+    stalled = suite.stalls_of([name for name in failed_once if not retries.second_run(name) and retries.may_stall(name)])
+    again = [name for name in failed_once if retries.second_run(name) or (name in stalled and len(stalled) <= STALLED)]
     for name, result in (suite.run_again(again) if again else {}).items():
         if name in again:  # not a case of a share: cases.py runs these again
             results[name] = "retried" if result == "passed" else "failed"
+    stalled.update(suite.stalled_cases)
 
     named = {what: sorted(name for name, result in results.items() if result == what)
              for what in ("failed", "skipped", "retried")}
-    unexpected = [name for name in named["skipped"] if skips.reason(name) is None]
+    unexpected = [name for name in named["skipped"] if not skips.skipped(name)]
     for name, output in suite.outputs.items():
         print(f"----- {name} failed with:", *end_of(output), sep="\n")
-    unlisted_again = [name for name in named["retried"] if not retries.second_run(name)]
-    for name in unlisted_again:
+    excused = [name for name in named["retried"] if name in stalled]
+    for name in excused:
         print(f"----- {name} failed at first with:", *end_of(suite.first_outputs.get(name, "")), sep="\n")
     for name in named["retried"]:
-        print(f"second run: {name}: {retries.second_run(name) or 'NOT LISTED (tests/retries.txt): find out why'}")
-    too_many = unlisted_again if len(unlisted_again) > UNLISTED else []
+        still = f"the machine stood still for {milliseconds(stalled[name])} while it ran" if name in stalled else ""
+        print(f"second run: {name}: {still or retries.second_run(name)}")
+    too_many = sorted(stalled) if len(stalled) > STALLED else []
     for name in too_many:
-        print(f"FAILED: {name}: one of more than {UNLISTED} that no list names")
+        print(f"FAILED: {name}: the machine stood still for {milliseconds(stalled[name])} while it ran, and while {len(stalled) - 1} others "
+              f"that failed ran: at most {STALLED} may run again")
     unlisted = [name for name, _ in suite.rounds if retries.reason(name, "rounds") is None]
     for name, what in suite.rounds:
         print(f"further round: {name}: {what}: {retries.reason(name, 'rounds') or 'NOT EXPECTED (tests/retries.txt)'}")
     for name, reason in skipped(named["skipped"], skips):
         print(f"skipped: {name}: {reason}")
+    left_out = {name: skips.left_out(name) or "NOT EXPECTED (tests/skips.txt)" for name in suite.left_out()}
+    print(f"left out by the build: {len(left_out)}")
+    for reason in dict.fromkeys(left_out.values()):
+        print(f"left out: {', '.join(name for name, why in left_out.items() if why == reason)}: {reason.removeprefix(LEFT_OUT).strip()}")
+    not_left_out = [name for name in left_out if not skips.left_out(name)]
     for name in named["failed"]:
         print(f"FAILED: {name}")
     wrongly_listed = suite.wrongly_listed()
     for name in wrongly_listed:
-        print(f"FAILED: {name}: ctest has not exactly one test for it; remove *_tests.cmake in {options.build}")
+        print(f"FAILED: {name}: ctest has not exactly one test for it; remove *_tests.cmake in {suite.build}")
     of_no_test = suite.of_no_test(retries, skips)
     for place, pattern in of_no_test:
         print(f"FAILED: {place}: no test matches {pattern}: remove the line, or name the test as it is called")
     suite.print_costly()
-    failed = {*named["failed"], *unexpected, *unlisted, *too_many, *wrongly_listed, *of_no_test}
+    print(f"stalls: {kind}: {suite.stalls.summary()}")
+    failed = {*named["failed"], *unexpected, *unlisted, *too_many, *not_left_out, *wrongly_listed, *of_no_test}
     passed = {name for name, result in results.items() if result in ("passed", "retried")} - failed
     print(f"{len(passed)} passed, {len(failed)} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")

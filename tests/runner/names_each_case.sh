@@ -7,7 +7,9 @@ trap 'rm -rf "$folder"' EXIT
 export PLANTED_MARK=$folder/mark
 fail() { echo "FAILED: $*"; cat "$folder/said" "$folder/results"; exit 1; }
 
-printf 'any Planted.%s\n' 'SucceedsAtItsSecondRun time planted' 'Fails rounds planted' >"$folder/retries"
+export PLCHOST_STALLS=$folder/stalls  # not those of the machine
+touch "$folder/stalls"
+printf 'any Planted.%s\n' 'SucceedsAtItsSecondRun time planted' 'Fails rounds planted' '*Stall* stall planted' >"$folder/retries"
 code=0
 ./cases.py --limit 10 --results "$folder/results" --retries "$folder/retries" --kind "$2" "$1" >"$folder/said" 2>&1 || code=$?
 [ "$code" -eq 1 ] || fail "exit code $code instead of 1"
@@ -22,6 +24,8 @@ expect passed SucceedsBehindOneThatAborts
 expect failed EndsTheProcess
 expect failed Hangs
 expect retried SucceedsAtItsSecondRun
+expect retried SucceedsAtItsSecondRunAfterAStall
+expect failed FailsOnceWithoutAStall
 expect failed LeavesAProcess
 expect failed SpoilsTheEnd
 says() { grep -qF -- "$1" "$folder/said" || fail "it does not say: $1"; }
@@ -30,6 +34,8 @@ says "FAILED: Planted.Aborts ended its process by signal 6"
 says "FAILED: Planted.EndsTheProcess ended its process with exit code 0"
 says "FAILED: Planted.Hangs takes longer than 10.0 s"
 says "again: Planted.SucceedsAtItsSecondRun"
+says "again: Planted.SucceedsAtItsSecondRunAfterAStall, as the machine stood still for 1,240 ms"
+grep -q "^retried	.*	1.240	" "$folder/results" || fail "the results do not tell the stall"
 ! grep -q "again: Planted.Fails" "$folder/said" || fail "a case with rounds of its own has a second run"
 
 # A share is a part, and all of them are the whole.

@@ -1,7 +1,11 @@
 // Cases that fail in each way in which a case can fail, for the test of the runner.
 
 #include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
 #include <memory>
+#include <string>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -36,6 +40,24 @@ TEST(Planted, SucceedsAtItsSecondRun) {
   const char* const mark = std::getenv("PLANTED_MARK");  // NOLINT(concurrency-mt-unsafe)
   ASSERT_NE(mark, nullptr);
   ASSERT_EQ(::access(mark, F_OK), 0) << "it is the first run" << std::fclose(std::fopen(mark, "w"));
+}
+
+// As stalls.py writes it: from when on, for how long, and how much of that the core did nothing.
+TEST(Planted, SucceedsAtItsSecondRunAfterAStall) {
+  const char* const stalls = std::getenv("PLCHOST_STALLS");  // NOLINT(concurrency-mt-unsafe)
+  ASSERT_NE(stalls, nullptr);
+  if (std::filesystem::file_size(stalls) > 0) return;
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  std::ofstream(stalls) << now.tv_sec - 1 << " 1.240 1.240\n";
+  FAIL() << "it is the first run";
+}
+
+TEST(Planted, FailsOnceWithoutAStall) {
+  const char* const mark = std::getenv("PLANTED_MARK");  // NOLINT(concurrency-mt-unsafe)
+  ASSERT_NE(mark, nullptr);
+  const std::string own = std::string(mark) + ".calm";
+  ASSERT_TRUE(std::filesystem::exists(own)) << "it is the first run" << std::ofstream(own).is_open();
 }
 
 TEST(Planted, LeavesAProcess) {
