@@ -15,9 +15,9 @@ struct ExchangeFailure {
   std::string text;
 };
 
-/// Sends a request on a connection that was made, and waits for its whole response.
-/// The library compares neither the unit nor the length of a response on TCP: a gateway that mixes up its
-/// devices would go unnoticed. After a failure the connection is of no use any more.
+/// Sends a request on a connection that was made, and waits for its whole response. After a failure the
+/// connection is of no use any more. On TCP libmodbus compares neither unit nor length of a response: the
+/// mistake of a gateway that mixes up its devices would not be seen.
 [[nodiscard]] std::expected<Pdu, ExchangeFailure> exchange_tcp(int fd, std::uint16_t number,
                                                                std::uint8_t unit, const Pdu& request,
                                                                TimePoint deadline);
