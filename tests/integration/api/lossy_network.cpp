@@ -1,5 +1,5 @@
 // Loaded with LD_PRELOAD: the network loses datagrams with the text $LOST_TEXT for $LOST_MS from the first
-// one on.
+// one on. The file $LOST_MARK is made when that is lost.
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <ctime>
 #include <span>
 
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -28,7 +29,12 @@ bool loses() {
   const std::int64_t loss_ns = std::strtol(lost_ms, nullptr, 10) * 1'000'000;
   const std::int64_t now = now_ns();
   std::int64_t first = 0;
-  return first_ns.compare_exchange_strong(first, now) || now - first < loss_ns;
+  if (first_ns.compare_exchange_strong(first, now)) {
+    const char* const mark = std::getenv("LOST_MARK");  // NOLINT(concurrency-mt-unsafe): never changed
+    if (mark != nullptr) ::close(::open(mark, O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
+    return true;
+  }
+  return now - first < loss_ns;
 }
 
 // A text is in one sample, and each sample in one piece.
