@@ -109,12 +109,10 @@ std::size_t find_word(std::string_view text, std::string_view name) {
 /// Of a byte of the token.
 iec::SourcePlace place_in(const iec::Token& token, std::size_t offset) {
   iec::SourcePlace place = token.place;
-  for (const char c : std::string_view(token.text).substr(0, offset)) {
-    ++place.column;
-    if (c != '\n') continue;
-    ++place.line;
-    place.column = 1;
-  }
+  const std::string_view before = std::string_view(token.text).substr(0, offset);
+  const std::size_t line = before.rfind('\n') + 1;  // 0: there is none
+  place.line += static_cast<unsigned>(std::ranges::count(before, '\n'));
+  place.column = (line == 0 ? place.column : 1) + iec::characters_in(before.substr(line));
   return place;
 }
 

@@ -35,6 +35,11 @@ bool is_date(std::string_view type) noexcept {
   return std::ranges::any_of(kDates, [&](std::string_view date) { return same(date, type); });
 }
 
+// The bytes of UTF-8 behind the first one of a character.
+bool continues_character(char c) noexcept {
+  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+}
+
 constexpr std::size_t kMostForeign = 20;  // problems; a file that is no text has no more
 
 class Reader {
@@ -62,7 +67,7 @@ class Reader {
       if (text_[position_++] == '\n') {
         ++place_.line;
         place_.column = 1;
-      } else {
+      } else if (!continues_character(text_[position_ - 1])) {
         ++place_.column;
       }
     }
@@ -188,6 +193,10 @@ bool Token::is(std::string_view word) const noexcept {
 std::size_t byte_order_mark(std::string_view text) noexcept {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   return text.starts_with(kMark) ? kMark.size() : 0;
+}
+
+unsigned characters_in(std::string_view text) noexcept {
+  return static_cast<unsigned>(std::ranges::count_if(text, [](char c) { return !continues_character(c); }));
 }
 
 std::string folded(std::string_view name) {

@@ -48,6 +48,9 @@ struct Tokens {
 /// The bytes of the mark of UTF-8 that some editors write at the begin of a file; else 0.
 [[nodiscard]] std::size_t byte_order_mark(std::string_view text) noexcept;
 
+/// As editors count columns: by characters of UTF-8.
+[[nodiscard]] unsigned characters_in(std::string_view text) noexcept;
+
 /// Any text, hostile ones included. Comments are left out: (* *), // and /* */. So is the mark of UTF-8.
 [[nodiscard]] Tokens tokens_of(std::string_view text, const std::string& file);
 

@@ -81,6 +81,20 @@ void add_pous_in(const fs::path& file, std::set<std::string>& names) {
   }
 }
 
+std::set<std::string> names_of_library(const std::string& library) {
+  std::set<std::string> names;
+  std::error_code none;  // without the folder iec2c says so
+  for (const fs::directory_entry& entry : fs::directory_iterator(library, none)) {
+    if (entry.path().extension() == ".txt") add_pous_in(entry.path(), names);
+  }
+  return names;
+}
+
+// GATE : ( OPEN , CLOSED )
+bool is_enumeration(const iec::DeclaredType& type) {
+  return type.definition.starts_with(iec::folded(type.name) + " : (");
+}
+
 std::string taken_text(std::string_view name) {
   return fmt::format("'{}' is also a name in the library of iec2c; choose another one", name);
 }
@@ -110,14 +124,34 @@ Result<Compiler> find_compiler(const std::string& folder) {
 }
 
 iec::SourceProblems taken_names(const iec::Project& project, const std::string& library) {
-  std::set<std::string> taken;
-  std::error_code none;  // without the folder iec2c says so
-  for (const fs::directory_entry& entry : fs::directory_iterator(library, none)) {
-    if (entry.path().extension() == ".txt") add_pous_in(entry.path(), taken);
-  }
+  const std::set<std::string> taken = names_of_library(library);
   iec::SourceProblems problems;
   for (const iec::Pou& pou : project.pous) {
     if (taken.contains(iec::folded(pou.name))) problems.push_back({pou.name_place, taken_text(pou.name)});
+  }
+  return problems;
+}
+
+iec::SourceProblems taken_variables(const iec::Project& project, const std::string& library) {
+  const std::set<std::string> taken = names_of_library(library);
+  iec::SourceProblems problems;
+  const auto check = [&](const std::string& name, const iec::SourcePlace& place) {
+    if (taken.contains(iec::folded(name))) problems.push_back({place, taken_text(name)});
+  };
+  const auto check_all = [&](const std::vector<iec::Variable>& variables) {
+    for (const iec::Variable& variable : variables) check(variable.name, variable.place);
+  };
+  for (const iec::Pou& pou : project.pous) check_all(pou.variables);
+  for (const iec::Configuration& configuration : project.configurations) {
+    check_all(configuration.globals);
+    for (const iec::Resource& resource : configuration.resources) check_all(resource.globals);
+  }
+  for (const iec::DeclaredType& type : project.types) {
+    if (!is_enumeration(type)) continue;
+    const iec::Tokens words = iec::tokens_of(type.definition, type.place.file);
+    for (const iec::Token& value : words.all) {
+      if (value.kind == iec::Token::Kind::name) check(value.text, type.place);
+    }
   }
   return problems;
 }

@@ -28,6 +28,10 @@ inline constexpr std::string_view kJoinedFile = "joined.st";
 /// without a place.
 [[nodiscard]] iec::SourceProblems taken_names(const iec::Project& project, const std::string& library);
 
+/// Variables and values of enumerations that are called as a POU of that library. iec2c refuses them in other
+/// words.
+[[nodiscard]] iec::SourceProblems taken_variables(const iec::Project& project, const std::string& library);
+
 /// The output of iec2c, in the words and places of the sources. Errors in its own library (in the folder
 /// `library`) come from a name of the program that the library has, too: that name is told, where it is
 /// declared.

@@ -121,9 +121,59 @@ class SectionSplitter {
   std::optional<std::size_t> end_;  // of the one before
 };
 
+// iec2c counts one column too many in the rest of the line in which a body begins, as it reads the first
+// character twice. Not if the body begins with a word that it knows at that point.
+class BodyFinder {
+ public:
+  /// Each token, in the order of the source.
+  void look(const Token& token) {
+    if (awaits_ && token.kind != Token::Kind::pragma) {
+      awaits_ = false;
+      if (!is_one_of(token, kOthers)) begins_.push_back(token.offset);
+    }
+    if (token.is("PROGRAM") || token.is("FUNCTION") || token.is("FUNCTION_BLOCK")) in_pou_ = true;
+    if (token.is("END_PROGRAM") || token.is("END_FUNCTION") || token.is("END_FUNCTION_BLOCK") ||
+        token.is("CONFIGURATION"))
+      in_pou_ = false;
+    if (token.is("END_VAR")) awaits_ = in_pou_;
+  }
+  /// Offsets in the source. In order.
+  [[nodiscard]] const std::vector<std::size_t>& begins() const noexcept { return begins_; }
+
+ private:
+  // Another section, the end, or what it knows.
+  static constexpr std::array<std::string_view, 19> kOthers{"VAR",
+                                                            "VAR_INPUT",
+                                                            "VAR_OUTPUT",
+                                                            "VAR_IN_OUT",
+                                                            "VAR_EXTERNAL",
+                                                            "VAR_TEMP",
+                                                            "VAR_ACCESS",
+                                                            "END_PROGRAM",
+                                                            "END_FUNCTION",
+                                                            "END_FUNCTION_BLOCK",
+                                                            "RETURN",
+                                                            "IF",
+                                                            "CASE",
+                                                            "FOR",
+                                                            "WHILE",
+                                                            "EXIT",
+                                                            "REPEAT",
+                                                            "INITIAL_STEP",
+                                                            ":="};
+  [[nodiscard]] static bool is_one_of(const Token& token, std::span<const std::string_view> words) {
+    return std::ranges::any_of(words, [&](std::string_view word) { return token.is(word); });
+  }
+
+  bool in_pou_ = false;
+  bool awaits_ = false;  // a body, behind a section
+  std::vector<std::size_t> begins_;
+};
+
 struct TextForIec2c {
   std::string text;
   std::vector<iec::Stretch> inserted;
+  std::vector<std::size_t> bodies;  // by their offset in the source
 };
 
 /// Inserts the words, and drops the mark of UTF-8.
@@ -162,10 +212,12 @@ TextForIec2c for_iec2c(const iec::Source& source) {
   for (const iec::Stretch& comment : tokens.new_comments) blank(text, comment.offset, comment.bytes);
   IntervalFinder intervals;
   SectionSplitter sections;
+  BodyFinder bodies;
   SectionSplitter::Insertions insertions;
   for (const Token& token : tokens.all) {
     const bool is_interval = intervals.is_interval(token);
     sections.look(token);
+    bodies.look(token);
     if (token.kind == Token::Kind::text) {
       name_signs(token, text, insertions);
     } else if (is_of_other_tools(token)) {
@@ -179,7 +231,15 @@ TextForIec2c for_iec2c(const iec::Source& source) {
   }
   std::ranges::copy(sections.insertions(), std::back_inserter(insertions));
   std::ranges::stable_sort(insertions, {}, [](const auto& one) { return one.first; });
-  return with_insertions(text, insertions);
+  TextForIec2c made = with_insertions(text, insertions);
+  made.bodies = bodies.begins();
+  return made;
+}
+
+std::string_view line_of(std::string_view text, unsigned line) {
+  for (; line > 1 && !text.empty(); --line)
+    text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
+  return text.substr(0, text.find('\n'));
 }
 
 }  // namespace
@@ -187,8 +247,10 @@ TextForIec2c for_iec2c(const iec::Source& source) {
 JoinedSource::JoinedSource(std::span<const iec::Source> sources) {
   unsigned line = 1;
   for (const iec::Source& source : sources) {
-    parts_.push_back({source.file, line});
-    const auto [text, inserted] = for_iec2c(source);
+    const auto [text, inserted, bodies] = for_iec2c(source);
+    const std::size_t mark = iec::byte_order_mark(source.text);
+    parts_.push_back({source.file, line, source.text.substr(mark), {}});
+    for (const std::size_t begin : bodies) parts_.back().bodies.push_back(begin - mark);
     std::size_t at = 0;
     std::size_t begin = 0;  // of the line
     unsigned of_line = line;
@@ -215,7 +277,18 @@ iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
   for (const Insertion& words : std::ranges::equal_range(insertions_, line, {}, &Insertion::line)) {
     if (words.column < column) inserted += std::min(column - words.column, words.bytes);
   }
-  return {part.file, line - part.first_line + 1, column - inserted};
+  const unsigned of_part = line - part.first_line + 1;
+  return {part.file, of_part, column <= 1 ? column : part.column(of_part, column - inserted)};
+}
+
+// In characters, of one in bytes.
+unsigned JoinedSource::Part::column(unsigned of_line, unsigned bytes) const {
+  const std::string_view line = line_of(source, of_line);
+  const auto begin = static_cast<std::size_t>(line.data() - source.data());
+  const auto body = std::ranges::lower_bound(bodies, begin);
+  if (body != bodies.end() && *body - begin < line.size() && bytes > *body - begin + 1) --bytes;
+  const std::string_view before = line.substr(0, bytes - 1);
+  return iec::characters_in(before) + bytes - static_cast<unsigned>(before.size());
 }
 
 }  // namespace plchost::matiec

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,13 +18,18 @@ class JoinedSource {
  public:
   explicit JoinedSource(std::span<const iec::Source> sources);
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
-  /// Of a place in the joined file.
+  /// Of a place in the joined file, as iec2c counts columns: in bytes, and one too many where a body begins.
+  /// The result counts characters, as editors do.
   [[nodiscard]] iec::SourcePlace place(unsigned line, unsigned column) const;
 
  private:
   struct Part {
+    [[nodiscard]] unsigned column(unsigned of_line, unsigned bytes) const;
+
     std::string file;
     unsigned first_line;
+    std::string source;               ///< without the mark of UTF-8
+    std::vector<std::size_t> bodies;  ///< where they begin in it. In order
   };
   /// Words that are inserted, by where they stand in the joined file. In order.
   struct Insertion {

@@ -199,7 +199,7 @@ TEST_F(BuildParts, SourcesWithoutAConfigurationAreNamed) {
   fs::create_directories(path("matiec/lib/C"));
   (void)put("matiec/lib/ieclib.txt", "");
   (void)put("matiec/lib/C/iec_std_lib.h", "");
-  fs::permissions(put("matiec/iec2c", "#!/bin/sh\necho 'joined.st:1-40..1-40: error: wrong'\nexit 1\n"),
+  fs::permissions(put("matiec/iec2c", "#!/bin/sh\necho 'joined.st:1-41..1-41: error: wrong'\nexit 1\n"),
                   fs::perms::owner_all);
   EXPECT_EQ(said({one}, path("matiec")), one + ":1:40: wrong");
 }

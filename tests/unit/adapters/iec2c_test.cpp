@@ -63,6 +63,49 @@ TEST(Iec2cNames, OfItsLibraryAreRefusedWhereAProgramTakesThem) {
   std::filesystem::remove_all(library);
 }
 
+TEST(Iec2cNames, OfItsLibraryAreToldOfVariablesAndValuesToo) {
+  const std::string library = own_path("ieclib");
+  std::filesystem::create_directory(library);
+  std::ofstream(library + "/standard_functions.txt")
+      << "FUNCTION LEFT\nFUNCTION LIMIT\nFUNCTION_BLOCK INTEGRAL";
+  const std::vector<iec::Source> sources{
+      {"a.st",
+       "TYPE Way : (Left, Ahead); Parts : STRUCT left : INT; END_STRUCT; END_TYPE\n"
+       "FUNCTION_BLOCK Ctl\nVAR integral : REAL; END_VAR\nEND_FUNCTION_BLOCK\n"
+       "CONFIGURATION c VAR_GLOBAL limit : INT; other : INT; END_VAR END_CONFIGURATION"}};
+  EXPECT_THAT(texts(taken_variables(iec::read_project(sources).project, library)),
+              ElementsAre("a.st:3:5: 'integral' is also a name in the library of iec2c; choose another one",
+                          "a.st:5:28: 'limit' is also a name in the library of iec2c; choose another one",
+                          "a.st:1:6: 'LEFT' is also a name in the library of iec2c; choose another one"));
+  std::filesystem::remove_all(library);
+}
+
+TEST(TheJoinedSource, CountsCharacters) {
+  const JoinedSource joined(std::vector<iec::Source>{
+      {"a.st", "\xEF\xBB\xBF(* \xC3\xA4 *) /* \xE6\x97\xA5 */ x := 'a$L';\ny := 1;\n"}});
+  EXPECT_EQ(joined.place(1, 1).column, 1U);
+  EXPECT_EQ(joined.place(1, 20).column, 17U) << "behind both comments";
+  EXPECT_EQ(joined.place(1, 99).column, 95U) << "beyond the line";
+  EXPECT_EQ(joined.place(2, 6).column, 6U);
+}
+
+TEST(TheJoinedSource, KnowsThatIec2cCountsOneTooManyWhereABodyBegins) {
+  const JoinedSource joined(std::vector<iec::Source>{
+      {"a.st",
+       "PROGRAM P\nVAR a : INT; END_VAR (* *) a := 1; b := 2;\n  c := 3;\nEND_PROGRAM\n"
+       "FUNCTION_BLOCK F\nVAR a : INT; END_VAR\nVAR_TEMP b : INT; END_VAR\n  IF a THEN\n  b := 2;\nEND_IF;\n"
+       "END_FUNCTION_BLOCK\nCONFIGURATION c\nVAR_GLOBAL g : INT; END_VAR RESOURCE r ON PLC\n"}});
+  const auto column = [&](unsigned line, unsigned told) { return joined.place(line, told).column; };
+  EXPECT_EQ(column(2, 5), 5U) << "a declaration before";
+  EXPECT_EQ(column(2, 29), 28U);
+  EXPECT_EQ(column(2, 37), 36U);
+  EXPECT_EQ(column(3, 3), 3U) << "the next line";
+  EXPECT_EQ(column(7, 10), 10U) << "a section";
+  EXPECT_EQ(column(8, 6), 6U) << "it knows this word";
+  EXPECT_EQ(column(9, 3), 3U);
+  EXPECT_EQ(column(13, 30), 30U) << "this is no body";
+}
+
 TEST(TheJoinedSource, HasLocatedVariablesInSectionsOfTheirOwn) {
   const auto joined = [](const std::string& text) {
     return JoinedSource(std::vector<iec::Source>{{"a.st", text}}).text();
