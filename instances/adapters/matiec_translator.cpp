@@ -11,6 +11,7 @@
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
+#include "instances/adapters/matiec/initial_values.hpp"
 #include "instances/adapters/matiec/located.hpp"
 #include "instances/adapters/matiec/loops.hpp"
 #include "instances/adapters/matiec/refused.hpp"
@@ -48,7 +49,7 @@ class MatiecTranslator : public Translator {
   }
 
   bool translate() override {
-    return translate_sources() && read_located() && end_escapes() &&
+    return translate_sources() && read_located() && mend_initial_values() &&
            (context_.order.debug ? instrument() : drop_directives());
   }
 
@@ -122,6 +123,10 @@ class MatiecTranslator : public Translator {
                                    std::string(matiec::kJoinedFile)});
     const auto end = context_.run("iec2c", command, context_.order.translate_limit);
     if (!end) return false;
+    if (!end->success()) {
+      std::ranges::move(matiec::taken_variables(context_.project, compiler_.library),
+                        std::back_inserter(context_.report.problems));
+    }
     std::ranges::move(matiec::problems_of(end->output, *joined_, context_.project, compiler_.library),
                       std::back_inserter(context_.report.problems));
     if (context_.good() && end->signal != 0) {
@@ -146,20 +151,22 @@ class MatiecTranslator : public Translator {
         fmt::format("#include \"plchost_library.h\"\n#include \"{}.c\"\n", configuration().name)));
   }
 
-  // In the initial values of globals.
-  bool end_escapes() {
+  // Of globals.
+  bool mend_initial_values() {
     std::vector<std::string> files{configuration().name + ".c"};
     for (const iec::Resource& resource : configuration().resources)
       files.push_back((resource.name.empty() ? "RESOURCE" : resource.name) + ".c");
-    return context_.rewrite(
-        files, [](const std::string& code) { return iec::with_ended_escapes(code, kTextMacro); });
+    return context_.rewrite(files, [](const std::string& code) {
+      return matiec::with_marked_initial_values(iec::with_ended_escapes(code, kTextMacro));
+    });
   }
 
   // Of the program, as iec2c should have written it.
   [[nodiscard]] std::optional<std::string> read_code() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return std::nullopt;
-    return iec::with_ended_escapes(matiec::with_first_turns(*code), kTextMacro);
+    return matiec::with_marked_initial_values(
+        iec::with_ended_escapes(matiec::with_first_turns(*code), kTextMacro));
   }
 
   bool drop_directives() {

@@ -7,6 +7,8 @@
 #ifndef PLCHOST_ADAPTER_H
 #define PLCHOST_ADAPTER_H
 
+#include "plchost_once.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif

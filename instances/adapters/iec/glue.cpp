@@ -260,7 +260,7 @@ void GlueWriter::write_tasks() {
 
 void GlueWriter::write_variables() {
   print(
-      "void plchost_each_variable(void (*use)(const struct plchost_variable*)) {{\n"
+      "PLCHOST_ONCE void plchost_each_variable(void (*use)(const struct plchost_variable*)) {{\n"
       "  struct plchost_variable v;\n  (void)use;\n  (void)v;\n");
   for (const ProgramVariable& variable : variables_.all) {
     print(

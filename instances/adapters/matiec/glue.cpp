@@ -139,7 +139,7 @@ class Writer : public iec::GlueWriter {
     const Symbols symbols = symbols_of(project(), resource(), plan(), value_of_place);
     std::ranges::copy(symbols.remarks, std::back_inserter(plan().remarks));
     print(
-        "void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n"
+        "PLCHOST_ONCE void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n"
         "  struct plchost_symbol s = {{0}};\n  (void)use;\n  (void)s;\n");
     for (const Symbol& symbol : symbols.all) write_symbol(symbol);
     print("}}\n");

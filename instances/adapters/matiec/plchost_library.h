@@ -1,5 +1,5 @@
 /*
- * MATIEC's library for C, with two parts that suit a host. The C files of a program include it first; its own
+ * MATIEC's library for C, with parts that suit a host. The C files of a program include it first; its own
  * include of the library then does nothing.
  */
 #ifndef PLCHOST_LIBRARY_H
@@ -8,17 +8,31 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "plchost_once.h"
+
 void plc_log(int nLevel, const char* pszText); /* of plc_app.h, whose other names the program may have */
 
-/* A date or a time of day is out of range. The library prints, and goes on with a wrong value, or reads
+/* A time or a date is out of range. The library prints, and goes on with a wrong value, or reads
  * beyond a table. Here the task gets an exception instead: nothing prints in a cycle. */
 _Noreturn static inline void plchost_runtime_error(void) {
-  plc_log(2, "IEC runtime error: a date or a time of day is out of range");
+  plc_log(2, "IEC runtime error: a time, a date or a time of day is out of range");
   abort();
 }
 
 #define fprintf(...) plchost_runtime_error()
+/* Its last lines include the functions and function blocks, which are to use other times. Their order counts.
+ */
+#define _IEC_STD_FUNCTIONS_H
+#define _IEC_STD_FB_H
+// clang-format off
 #include "iec_std_lib.h"
+#undef _IEC_STD_FUNCTIONS_H
+#undef _IEC_STD_FB_H
+#include "plchost_times.h"
+#include "iec_std_functions.h"
+#include "iec_std_FB.h"
+#include "plchost_texts.h"
+// clang-format on
 #undef fprintf
 
 /* The timers' clock begins when the machine does. RTC shows the date (UTC) while IN is FALSE. When IN rises,

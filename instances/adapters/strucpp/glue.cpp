@@ -81,7 +81,9 @@ class Writer : public iec::GlueWriter {
   void write_symbols() override {
     const Symbols found = symbols_of(project(), plan(), symbols_);
     std::ranges::copy(found.remarks, std::back_inserter(plan().remarks));
-    print("void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n  (void)use;\n");
+    print(
+        "PLCHOST_ONCE void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{\n  "
+        "(void)use;\n");
     for (const Symbol& symbol : found.all) write_symbol(symbol);
     print("}}\n");
     if (pous_.empty()) return;
