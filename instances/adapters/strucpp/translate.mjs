@@ -147,6 +147,71 @@ function* nodesIn(root) {
   }
 }
 
+const kRanges = new Map(
+  [8n, 16n, 32n, 64n].flatMap((bits, i) => [
+    [['SINT', 'INT', 'DINT', 'LINT'][i], [-(1n << (bits - 1n)), (1n << (bits - 1n)) - 1n]],
+    [['USINT', 'UINT', 'UDINT', 'ULINT'][i], [0n, (1n << bits) - 1n]],
+  ]),
+);
+
+// Of a number; undefined: of another expression.
+function integerOf(node) {
+  if (node?.kind === 'UnaryExpression' && node.operator === '-') {
+    const value = integerOf(node.operand);
+    return value === undefined ? undefined : -value;
+  }
+  if (node?.kind === 'ParenthesizedExpression') return integerOf(node.expression);
+  if (node?.kind !== 'LiteralExpression' || node.literalType !== 'INT') return undefined;
+  const [, base, digits] = /^(?:[A-Z]+#)?(?:(16|8|2)#)?(\w+)$/i.exec(node.rawValue.replaceAll('_', '')) ?? [];
+  if (digits === undefined) return undefined;
+  const prefix = { 16: '0x', 8: '0o', 2: '0b' }[base] ?? '';
+  try {
+    return BigInt(`${prefix}${digits}`);
+  } catch {
+    return undefined;
+  }
+}
+
+// The nanoseconds of T#1h2m3.5s, exactly; undefined: of another form.
+function exactNanoseconds(text) {
+  const units = { d: 86400n * 10n ** 9n, h: 3600n * 10n ** 9n, m: 60n * 10n ** 9n, s: 10n ** 9n, ms: 10n ** 6n, us: 1000n, ns: 1n };
+  const parts = text.replaceAll('_', '').replace(/^[a-z]+#/i, '').toLowerCase();
+  if (!/^(?:\d+(?:\.\d+)?(?:ms|us|ns|d|h|m|s))+$/.test(parts)) return undefined;
+  let sum = 0n;
+  for (const [, whole, fraction = '', unit] of parts.matchAll(/(\d+)(?:\.(\d+))?(ms|us|ns|d|h|m|s)/g)) {
+    sum += (BigInt(whole + fraction) * units[unit]) / 10n ** BigInt(fraction.length);
+  }
+  return sum;
+}
+
+function literalAsWritten(node) {
+  const [file, line, column] = placeOf(node);
+  const written = (lines[file]?.[line - 1] ?? '').slice(column - 1, column - 1 + node.rawValue.length);
+  return written.toUpperCase() === node.rawValue.toUpperCase() ? written : node.rawValue;
+}
+
+// By file, line and column.
+function byPlace({ place: one }, { place: other }) {
+  return one[0] - other[0] || one[1] - other[1] || one[2] - other[2];
+}
+
+// Why a literal becomes another value in C++; undefined: it does not.
+function literalProblem(node, isInitial, nanosecondsOf) {
+  if (node.kind !== 'LiteralExpression' || (node.typePrefix ?? '') !== '') return undefined;
+  const text = literalAsWritten(node);
+  if (node.literalType === 'INT' && !isInitial && !text.includes('#')) {
+    const value = integerOf(node);
+    if (value !== undefined && String(value) !== String(node.value)) return `STruC++ makes ${node.value} of ${text}; write it with its type, as LINT#${text}`;
+  }
+  if (node.literalType === 'REAL' && text.includes('_')) return `STruC++ makes ${node.value} of ${text}; write it without _`;
+  if (node.literalType === 'TIME' && nanosecondsOf !== undefined) {
+    const exact = exactNanoseconds(text);
+    const { nanoseconds } = nanosecondsOf(String(node.value));
+    if (exact !== undefined && String(exact) !== String(nanoseconds)) return `STruC++ makes ${nanoseconds} ns of ${text}; write whole numbers, without _`;
+  }
+  return undefined;
+}
+
 class Plan {
   constructor(result) {
     this.ast = result.ast;
@@ -252,6 +317,42 @@ class Plan {
     return this.ast.functions
       .filter((pou) => standard?.isStandardFunction(pou.name) === true)
       .map((pou) => ({ place: placeOf(pou), text: `STruC++ calls its own function ${pou.name} in the place of this one; choose another name` }));
+  }
+
+  // Numbers and times that become others in C++, of which the compiler says nothing, or not where.
+  checkLiterals(nanosecondsOf) {
+    const initial = new Set();
+    for (const node of nodesIn(this.ast)) {
+      if (Array.isArray(node.names) && node.initialValue !== undefined) for (const value of nodesIn(node.initialValue)) initial.add(value);
+    }
+    const problems = [];
+    for (const node of nodesIn(this.ast)) {
+      const text = literalProblem(node, initial.has(node), nanosecondsOf);
+      if (text !== undefined) problems.push({ place: placeOf(node), text });
+    }
+    return problems.sort(byPlace);
+  }
+
+  // It compares with the end by the sign of a step that is a number, and counts on before.
+  checkLoops() {
+    const before = this.remarks.length;
+    for (const pou of [...this.ast.programs, ...this.ast.functionBlocks, ...this.ast.functions]) {
+      const types = new Map();
+      for (const node of nodesIn(pou)) {
+        if (Array.isArray(node.names)) for (const name of node.names) types.set(name.toUpperCase(), node.type?.name?.toUpperCase());
+      }
+      for (const node of nodesIn(pou)) {
+        if (node.kind !== 'ForStatement') continue;
+        const step = node.step === undefined ? 1n : integerOf(node.step);
+        const range = kRanges.get(types.get(node.controlVariable.toUpperCase()));
+        if (step === undefined) {
+          this.remark(node, 'STruC++ compares as if the step of this FOR were positive: with a negative one it has no turn, or does not end');
+        } else if (range !== undefined && integerOf(node.end) === range[step < 0n ? 0 : 1]) {
+          this.remark(node, `this FOR does not end by itself with STruC++: no value of its variable lies beyond ${integerOf(node.end)}`);
+        }
+      }
+    }
+    this.remarks.push(...this.remarks.splice(before).sort(byPlace));
   }
 
   // As the compiler calls a member, which it does not always call as the source does.
@@ -423,6 +524,18 @@ function symbolsOf(table) {
   return [...found.values()];
 }
 
+// Its function for times, in a private part of it: a version without has no check.
+async function timesOfCompiler() {
+  const model = join(folder, 'dist', 'project-model.js');
+  return existsSync(model) ? (await import(pathToFileURL(model).href)).parseTimeLiteral : undefined;
+}
+
+// The compiler counts units of UTF-16.
+function inCharacters({ place: [file, line, column], ...rest }) {
+  const before = (lines[file]?.[line - 1] ?? '').slice(0, Math.max(column - 1, 0));
+  return { ...rest, place: [file, line, column - before.length + [...before].length] };
+}
+
 const result = translate();
 const plan = {
   format: 1,
@@ -440,7 +553,8 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
-  plan.problems.push(...found.checkWhatIsDropped());
+  plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()));
+  found.checkLoops();
   const table = await debugTable(result);
   plan.symbols = symbolsOf(table);
   if (plan.symbols.length > kMostSymbols) {
@@ -458,4 +572,6 @@ if (result.success) {
   writeFileSync('debug_table.cpp', table, { flag: 'wx' });
   writeFileSync('debug_map.json', JSON.stringify(result.debugMap ?? {}), { flag: 'wx' });
 }
+plan.problems = plan.problems.map(inCharacters);
+plan.remarks = plan.remarks.map(inCharacters);
 writeFileSync('plan.json', JSON.stringify(plan), { flag: 'wx' });

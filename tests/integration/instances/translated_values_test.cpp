@@ -1,0 +1,120 @@
+// Values that MATIEC's own library or STruC++ make wrong without a word: they are right, or the build tells
+// of them.
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/adapters/run_program.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+#include "tests/integration/instances/value_client.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class ValuesOfTranslatedText : public ::testing::Test {
+ protected:
+  void need(const char* variable) {
+    const char* const folder = std::getenv(variable);
+    if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "needs " << variable;
+  }
+  /// A program Main, in a configuration of one task.
+  ProgramEnd build(const std::string& variables, const std::string& statements, const std::string& compiler) {
+    const std::string text = fmt::format(
+        "PROGRAM Main\nVAR\n{}\nEND_VAR\n{}\nEND_PROGRAM\nCONFIGURATION cell RESOURCE press ON PLC\n"
+        "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\nEND_RESOURCE "
+        "END_CONFIGURATION\n",
+        variables, statements);
+    auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", text), "-o",
+                            sandbox.folder() + "/values.so", "--compiler", compiler},
+                           sandbox.folder());
+    return end ? *std::move(end) : ProgramEnd{};
+  }
+
+  Sandbox sandbox;
+};
+
+TEST_F(ValuesOfTranslatedText, ByMatiecAreThoseOfTheStandard) {
+  need("PLCHOST_MATIEC");
+  if (IsSkipped()) return;
+  const ProgramEnd end = build(
+      "ms : TIME := T#1ms; part : TIME := T#1.005s; half : TIME := T#500ms; sum : TIME; same : BOOL; less : "
+      "TIME;\n"
+      "many : TIME; later : DATE := D#2045-06-01; at1 : DT := DT#2040-01-01-00:00:01; day : TOD := "
+      "TOD#23:59:58.001;\n"
+      "t1, t2, t3, t4, t5 : STRING; text : STRING := 'ABCDEF'; cycles : DINT;",
+      "sum := half + half; same := sum = T#1s; less := T#1s - T#1ms; many := T#900ms * 3;\n"
+      "t1 := REPLACE('ABC', 'xyz', 1, 2); t2 := DELETE(text, 300, 3); t3 := MID(text, 300, 5);\n"
+      "t4 := INSERT(text, '-', 300); t5 := DELETE(text, 2, 0); cycles := cycles + 1;",
+      "matiec");
+  ASSERT_TRUE(end.success()) << end.output;
+  InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
+  sut.wait_until_up();
+  ValueClient client(sandbox);
+  EXPECT_TRUE(eventually([&] { return client.read("one.cycles") != "0"; }));
+  for (const auto& [name, value] : {std::pair{"ms", "T#1ms"},
+                                    {"part", "T#1s5ms"},
+                                    {"sum", "T#1s"},
+                                    {"same", "TRUE"},
+                                    {"less", "T#999ms"},
+                                    {"many", "T#2s700ms"},
+                                    {"later", "D#2045-06-01"},
+                                    {"at1", "DT#2040-01-01-00:00:01"},
+                                    {"day", "TOD#23:59:58.001"},
+                                    {"t1", "'AxyzC'"},
+                                    {"t2", "'AB'"},
+                                    {"t3", "'EF'"},
+                                    {"t4", "'ABCDEF-'"},
+                                    {"t5", "''"}}) {
+    EXPECT_EQ(client.read(fmt::format("one.{}", name)), value) << name;
+  }
+}
+
+TEST_F(ValuesOfTranslatedText, ThatStrucppChangesAreRefusedAtTheirPlace) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const ProgramEnd end =
+      build("l : LINT := 9007199254740993; t : TIME; pause : TIME := T#1_000ms;",
+            "l := 9007199254740993;\nt := T#1.005s;\n(* \xF0\x9F\x99\x82 *) l := 9223372036854775807;\n"
+            "l := LINT#9007199254740993; l := 16#7FFF_FFFF_FFFF_FFFF; t := T#1h2m3s4ms; t := T#2.5h;",
+            "strucpp");
+  EXPECT_FALSE(end.success());
+  EXPECT_THAT(end.output, HasSubstr("values.st:3:57: STruC++ makes 0 ns of T#1_000ms"));
+  EXPECT_THAT(end.output,
+              HasSubstr("values.st:5:6: STruC++ makes 9007199254740992 of 9007199254740993; write it "
+                        "with its type, as LINT#9007199254740993"));
+  EXPECT_THAT(end.output, HasSubstr("values.st:6:6: STruC++ makes 1004999999.9999999 ns of T#1.005s"));
+  EXPECT_THAT(end.output, HasSubstr("values.st:7:14: STruC++ makes")) << "a character is a column";
+  EXPECT_THAT(end.output, Not(HasSubstr("values.st:8:")));
+}
+
+TEST_F(ValuesOfTranslatedText, LoopsThatStrucppDoesNotEndAreTold) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const ProgramEnd end =
+      build("i : INT; u : USINT; s : INT := -1; n : INT;",
+            "FOR u := 0 TO 255 DO n := 1; END_FOR;\nFOR i := 3 TO 1 BY s DO n := 1; END_FOR;\n"
+            "FOR i := 0 TO -32768 BY -1 DO n := 1; END_FOR;\n"
+            "FOR u := 3 TO 0 BY -1 DO n := 1; END_FOR;\n"
+            "FOR i := 9 TO 0 BY -3 DO n := 1; END_FOR; FOR i := 0 TO 255 DO n := 1; END_FOR;",
+            "strucpp");
+  ASSERT_TRUE(end.success()) << end.output;
+  for (const char* const told :
+       {"values.st:5:1: note: this FOR does not end by itself",
+        "values.st:6:1: note: STruC++ compares as if the step of this FOR were positive",
+        "values.st:7:1: note: this FOR does not end by itself",
+        "values.st:8:1: note: this FOR does not end by itself"}) {
+    EXPECT_THAT(end.output, HasSubstr(told));
+  }
+  EXPECT_THAT(end.output, Not(HasSubstr("values.st:9:")));
+}
+
+}  // namespace
+}  // namespace plchost::testing
