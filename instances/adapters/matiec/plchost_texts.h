@@ -1,7 +1,7 @@
 /*
- * MID, INSERT, DELETE and REPLACE for the programs of MATIEC. Those of its own library cut the new text of
- * REPLACE to the length of the old one, count lengths modulo 256, and read before a text if P is 0. Part of
- * plchost_library.h, which includes it behind that library.
+ * MID, INSERT, DELETE and REPLACE for the programs of MATIEC. Its own library cuts the new text of REPLACE
+ * to the length of the old one. It counts lengths modulo 256, and reads before a text if P is 0. This is a
+ * part of plchost_library.h, which includes it behind that library.
  */
 #ifndef PLCHOST_TEXTS_H
 #define PLCHOST_TEXTS_H

@@ -1,6 +1,6 @@
 /*
- * Times and dates for the programs of MATIEC. Those of its own library are wrong without a word: T#1ms has
- * 999999 ns, T#500ms + T#500ms is not T#1s, T#900ms * 3 does not fit, and dates end in 2038. Part of
+ * Times and dates for the programs of MATIEC. Its own library is wrong without a word: T#1ms has 999999 ns.
+ * There T#500ms + T#500ms is not T#1s, T#900ms * 3 does not fit, and dates end in 2038. This is a part of
  * plchost_library.h, which includes it between the two halves of that library.
  */
 #ifndef PLCHOST_TIMES_H
