@@ -1,11 +1,12 @@
 // Cases that fail in each way in which a case can fail, for the test of the runner.
 
+#include <chrono>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -47,9 +48,9 @@ TEST(Planted, SucceedsAtItsSecondRunAfterAStall) {
   const char* const stalls = std::getenv("PLCHOST_STALLS");  // NOLINT(concurrency-mt-unsafe)
   ASSERT_NE(stalls, nullptr);
   if (std::filesystem::file_size(stalls) > 0) return;
-  timespec now{};
-  ::clock_gettime(CLOCK_MONOTONIC, &now);
-  std::ofstream(stalls) << now.tv_sec - 1 << " 1.240 1.240\n";
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // the runner has heard that it runs
+  const auto now = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  std::ofstream(stalls) << std::fixed << now - 1.24 << " 1.240 1.240\n";
   FAIL() << "it is the first run";
 }
 
