@@ -25,7 +25,7 @@ expect failed EndsTheProcess
 expect failed Hangs
 expect retried SucceedsAtItsSecondRun
 expect retried SucceedsAtItsSecondRunAfterAStall
-expect failed FailsOnceWithoutAStall
+expect failed HasNoSecondRunWithoutAStall
 expect failed LeavesAProcess
 expect failed SpoilsTheEnd
 says() { grep -qF -- "$1" "$folder/said" || fail "it does not say: $1"; }

@@ -54,7 +54,7 @@ TEST(Planted, SucceedsAtItsSecondRunAfterAStall) {
   FAIL() << "it is the first run";
 }
 
-TEST(Planted, FailsOnceWithoutAStall) {
+TEST(Planted, HasNoSecondRunWithoutAStall) {
   const char* const mark = std::getenv("PLANTED_MARK");  // NOLINT(concurrency-mt-unsafe)
   ASSERT_NE(mark, nullptr);
   const std::string own = std::string(mark) + ".calm";
