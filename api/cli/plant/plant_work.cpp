@@ -123,13 +123,16 @@ bool HostWork::has_schedulers() {
 Async<bool> HostWork::check() {
   const bool names_any = std::ranges::any_of(
       wanted_.instances, [](const WantedInstance& instance) { return !instance.scheduler.empty(); });
-  if (!names_any || !co_await enter()) co_return true;
-  co_return has_schedulers();
+  if (!names_any) co_return true;
+  const bool entered = co_await enter();
+  co_return entered&& has_schedulers();
 }
 
 Async<bool> HostWork::run() {
-  if (!findings_.empty() || !co_await enter() || !has_schedulers()) co_return false;
-  while (round_ <= kRounds && co_await look_at_all()) ++round_;
+  if (!findings_.empty()) co_return false;
+  const bool entered = co_await enter();
+  if (!entered || !has_schedulers()) co_return false;
+  for (bool changed = true; changed && round_ <= kRounds; ++round_) changed = co_await look_at_all();
   co_return true;
 }
 
@@ -145,7 +148,8 @@ Async<bool> HostWork::look_at_all() {
     if (given_up_.contains(instance.name)) continue;
     const auto found = present->find(instance.name);
     if (found != present->end()) {
-      changed |= co_await look_at_one(instance, found->second);
+      const bool now_changed = co_await look_at_one(instance, found->second);
+      changed = changed || now_changed;
       continue;
     }
     given_up_.insert(instance.name);
@@ -163,14 +167,18 @@ Async<bool> HostWork::look_at_one(const WantedInstance& wanted, const PresentIns
   for (const PlantChange& needed : all_needed) {
     if (!work_.apply) {
       tell(Kind::differs, &wanted, "", &needed);
-    } else if (round_ == kRounds) {
+      continue;
+    }
+    if (round_ == kRounds) {
       tell(Kind::failed, &wanted, "all commands succeeded, and the difference is still there", &needed);
-    } else if (co_await change(wanted, needed)) {
-      changed = true;
-    } else {
+      continue;
+    }
+    const bool done = co_await change(wanted, needed);
+    if (!done) {
       given_up_.insert(wanted.name);
       co_return false;  // the rest counts on it
     }
+    changed = true;
   }
   co_return changed;
 }
