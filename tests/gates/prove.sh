@@ -113,6 +113,9 @@ new_tree
 echo 'int fd = open(path, O_RDWR | O_CR''EAT);' >"$plot/tree/shm/base/link.cpp" && commit_tree
 must_be_red "house: file through a link" "the lines above make files through links" "$gates/house.sh" "$plot/tree"
 new_tree
+echo 'bool f() { if (a && !co_aw''ait b()) co_return true; }' >"$plot/tree/api/await.cpp" && commit_tree
+must_be_red "house: await in a condition" "the lines above await within a condition" "$gates/house.sh" "$plot/tree"
+new_tree
 echo 'std::copy_n(name, n, address.sun_path + 1);' >"$plot/tree/shm/base/name.cpp" && commit_tree
 must_be_red "house: abstract socket" "the lines above use names that anybody can take" "$gates/house.sh" "$plot/tree"
 new_tree
