@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <linux/capability.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "shm/base/unique_fd.hpp"
@@ -38,7 +39,7 @@ TEST(GivenUpRights, OfCapabilitiesTheOthersStay) {
   const std::string left = in_a_child([] {
     if (!give_up_capabilities({CAP_SETGID, CAP_SETUID})) return std::string("refused");
     constexpr uid_t kNobody = 65534;
-    return fmt::format("{} {}", ::setresuid(kNobody, kNobody, kNobody),
+    return fmt::format("{} {}", ::syscall(SYS_setresuid, kNobody, kNobody, kNobody),
                        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && never_gains_rights());
   });
   EXPECT_EQ(left, "-1 true");
