@@ -21,8 +21,8 @@ namespace plchost {
 class AuditLog {
  public:
   struct Options {
-    std::string
-        folder;  ///< made if it is not there, for its owner only; a group that writes it writes its files
+    /// Made if it is not there, for its owner only. A group that may write it may write its files.
+    std::string folder;
     std::size_t file_bytes = std::size_t{16} << 20;  ///< then the next file is begun
     std::size_t most_files = 64;                     ///< then the oldest is removed
   };

@@ -28,7 +28,7 @@ struct ForeignFile {
     std::string_view pool, const MemoryRights& rights, std::optional<uid_t> api_server = std::nullopt);
 
 /// Gives the pool's files that belong to this user and to root's group to `group`. A manager before this one
-/// had root's group, and its processes have made them. Set-up.
+/// had root's group, and its processes have made them. Set-up, and any soft thread later.
 void give_roots_files(std::string_view pool, gid_t group) noexcept;
 
 }  // namespace plchost

@@ -22,6 +22,7 @@
 #include "shm/plc_process_image.h"
 #include "shm/plc_reference_clock.h"
 #include "shm/pool/object_pool.hpp"
+#include "tests/support/in_a_child.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -264,22 +265,10 @@ class MemoriesOfOtherUsers : public testing::Test {
   }
   /// The answer of `body` in a process of that user, which then ends without closing anything; "" is good.
   static std::string as_user(uid_t user, gid_t group, const std::function<std::string()>& body) {
-    std::array<int, 2> pipe{};
-    EXPECT_EQ(::pipe(pipe.data()), 0);
-    const pid_t child = ::fork();
-    if (child == 0) {
+    return in_a_child([&] {
       const bool other = ::setgroups(0, nullptr) == 0 && ::setgid(group) == 0 && ::setuid(user) == 0;
-      const std::string text = other ? body() : "cannot become another user";
-      (void)!::write(pipe[1], text.data(), text.size());
-      ::_exit(0);
-    }
-    ::close(pipe[1]);
-    std::string text(4096, '\0');
-    const ssize_t got = ::read(pipe[0], text.data(), text.size());
-    ::close(pipe[0]);
-    ::waitpid(child, nullptr, 0);
-    text.resize(static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
-    return text;
+      return other ? body() : "cannot become another user";
+    });
   }
   [[nodiscard]] std::string create(mode_t mode, char content) const {
     static SharedMemory held;  // to the death of the process
