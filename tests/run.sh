@@ -44,6 +44,7 @@ if [ "${1:-}" != --step ] && [ "${1:-}" != --fuzz ]; then
   # By these the last step finds what the tests have left behind. The name is short: sockets lie in it.
   own=$(mktemp -d "${TMPDIR:-/tmp}/plc.XXXXXX")
   mkdir "$own/t"
+  chmod 711 "$own" "$own/t"  # tests start programs as other users
   export TMPDIR=$own/t PLCHOST_RUN=${own##*/}
   log=$own/log
   notes=$own/notes

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -37,6 +38,16 @@ Result<UniqueFd> make_socket() {
   return UniqueFd(fd);
 }
 
+/// Also where this user may not go: the folder that keeps it out is often far above the socket.
+std::string kept_out_by(const std::string& path) {
+  for (auto end = path.find('/', 1); end != std::string::npos; end = path.find('/', end + 1)) {
+    const std::string folder = path.substr(0, end);
+    if (::faccessat(AT_FDCWD, folder.c_str(), X_OK, AT_EACCESS) == 0) continue;
+    return fmt::format("user {} may not enter {}", ::geteuid(), folder);
+  }
+  return fmt::format("user {} may not write to it", ::geteuid());
+}
+
 const sockaddr* as_sockaddr(const sockaddr_un& address) {
   return reinterpret_cast<const sockaddr*>(&address);  // the sockets API is made that way
 }
@@ -48,6 +59,10 @@ Result<PacketSocket> PacketSocket::connect(const std::string& path) {
   PLCHOST_TRY_ASSIGN(auto fd, make_socket());
   if (::connect(fd.get(), as_sockaddr(address), sizeof address) != 0) {
     const int error = errno;
+    if (error == EACCES) {
+      return failure(ErrorCode::unavailable, fmt::format("cannot connect to {}: {}", path, kept_out_by(path)),
+                     error);
+    }
     // A non-blocking connect says EAGAIN when the listener's backlog is full.
     return failure(error == EAGAIN ? ErrorCode::busy : ErrorCode::unavailable,
                    fmt::format("cannot connect to {}", path), error);

@@ -10,6 +10,8 @@ done
 # Numbers that no account has.
 user=64042 group=64041
 chmod 711 "$cell"
+setpriv --reuid "$user" --regid "$group" --clear-groups test -x "$cell" ||
+  fail "user $user may not enter $cell, or a folder above it"
 rights=(setpriv --regid "$group" --clear-groups --no-new-privs --bounding-set=-all,+sys_nice,+ipc_lock,+setuid,+setgid
   --inh-caps=-all)
 start_service() { # start_service HOST: as start_manager

@@ -7,11 +7,13 @@
 #include <fstream>
 #include <string>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include "tests/support/in_a_child.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/receive_until.hpp"
 
@@ -127,6 +129,32 @@ TEST_F(PacketSocketTest, AcceptGivesNothingIfNobodyWaits) {
 
 TEST_F(PacketSocketTest, ConnectFailsWhereNobodyListens) {
   EXPECT_EQ(PacketSocket::connect(path_).error().code, ErrorCode::unavailable);
+}
+
+TEST_F(PacketSocketTest, ConnectNamesTheFolderThatKeepsAUserOut) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
+  const auto inner = directory_ / "inner";
+  std::filesystem::create_directory(inner);
+  const auto listener = PacketListener::listen(inner / "s");
+  ASSERT_TRUE(listener) << listener.error().describe();
+  const auto refused = [&](std::filesystem::perms closed, std::filesystem::perms open) {
+    std::filesystem::permissions(directory_, closed);
+    std::filesystem::permissions(inner, open);
+    return in_a_child([&] {
+      // By the calls themselves: the library's would also ask threads that a sanitizer's child does not have.
+      const bool nobody = ::syscall(SYS_setgroups, 0, nullptr) == 0 &&
+                          ::syscall(SYS_setresgid, -1, 65534, -1) == 0 &&
+                          ::syscall(SYS_setresuid, -1, 65534, -1) == 0;
+      if (!nobody) return std::string("cannot become another user");
+      return PacketSocket::connect(inner / "s").error().describe();
+    });
+  };
+  using std::filesystem::perms;
+  EXPECT_THAT(refused(perms::owner_all, perms::all),
+              testing::HasSubstr("user 65534 may not enter " + directory_.string() + ": Permission denied"));
+  EXPECT_THAT(refused(perms::all, perms::owner_all),
+              testing::HasSubstr("user 65534 may not enter " + inner.string() + ":"));
+  EXPECT_THAT(refused(perms::all, perms::all), testing::HasSubstr("user 65534 may not write to it:"));
 }
 
 TEST_F(PacketSocketTest, ConnectIsBusyWhenTooManyWait) {
