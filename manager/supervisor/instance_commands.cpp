@@ -226,6 +226,7 @@ void ManagedInstance::forward_or_wait() {
 void ManagedInstance::forward() {
   // It may have waited for the process to come up.
   if (const auto in_time = check_in_time(operation_->request.limit_ns); !in_time) {
+    take_back_stop();
     return finish(in_time.error().code, in_time.error().message);
   }
   operation_->step = Step::forwarded;

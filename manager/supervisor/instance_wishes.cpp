@@ -185,11 +185,17 @@ void ManagedInstance::look_for_process() {
 // An operator's stop holds from here on, whatever becomes of the process meanwhile.
 void ManagedInstance::follow_command(ControlVerb verb) {
   if (verb == ControlVerb::stop) {
-    commanded_ = true;
-    wants_running_ = false;
+    operation_->commanded_before = std::exchange(commanded_, true);
+    operation_->wanted_before = std::exchange(wants_running_, false);
+    unreadable_.clear();
   }
-  if (verb == ControlVerb::stop) unreadable_.clear();
   remember();
+}
+
+void ManagedInstance::take_back_stop() {
+  if (operation_->request.verb != ControlVerb::stop) return;
+  commanded_ = operation_->commanded_before;
+  wants_running_ = operation_->wanted_before;
 }
 
 InstanceWish ManagedInstance::wish() const {

@@ -193,7 +193,9 @@ class ManagedInstance : public InstanceEvents {
     ControlReplyFunction reply;
     Step step = Step::until_up;
     std::uint64_t forwarded_number = 0;
-    std::string refused{};  // why what was to be loaded did not come up; empty: it did
+    std::string refused{};          // why what was to be loaded did not come up; empty: it did
+    bool commanded_before = false;  // of a stop: the wish that it took the place of
+    bool wanted_before = true;
   };
   struct ForwardedOrder {
     ControlRequest request;
@@ -264,6 +266,8 @@ class ManagedInstance : public InstanceEvents {
   void ended_unwatched();
   void look_for_process();
   void follow_command(ControlVerb verb);
+  /// Its client is told that the stop is not done, so the wish before it holds again.
+  void take_back_stop();
   [[nodiscard]] std::int64_t unix_of(TimePoint time) const noexcept {
     return time.time_since_epoch().count() + unix_offset_ns_;
   }

@@ -165,6 +165,30 @@ TEST_F(ManagedInstanceTest, RestartOfARunningOneThatOutlastsItsClientRunsAgain) 
   EXPECT_EQ(state(), InstanceState::running);
 }
 
+TEST_F(ManagedInstanceTest, StopThatIsNotDoneForItsLimitLeavesTheWishBefore) {
+  sut().hold("is to be started");
+  sut().release();
+  ask_until(1, ControlVerb::stop);  // long ago when the process is up
+  report_ready();
+  EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
+  EXPECT_EQ(state(), InstanceState::running);
+  ASSERT_TRUE(wishes_.wish);
+  EXPECT_TRUE(wishes_.wish->running);
+  EXPECT_FALSE(wishes_.wish->commanded);
+  crash_once();
+  EXPECT_FALSE(host_.spawned.back().stopped) << "its client was told that the stop is not done";
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(ManagedInstanceTest, StopThatWaitsHoldsForTheProcessThatFollowsOneThatCrashes) {
+  sut().hold("is to be started");
+  sut().release();
+  ask_until(1, ControlVerb::stop);
+  sut().on_exit(killed_by(SIGSEGV));
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  EXPECT_EQ(state(), InstanceState::offline);
+}
+
 TEST_F(ManagedInstanceTest, TellsHowManyForcesHaveEndedWithTheProcess) {
   const auto force = [this](std::uint32_t count) {
     host_.page.emplace();
