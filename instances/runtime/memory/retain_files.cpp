@@ -82,12 +82,16 @@ auto RetainFiles::read() const -> Found {
   for (std::uint64_t file = 0; file < 2; ++file) {
     const auto text = read_whole(path(file));
     if (!text) {
-      if (text.error().code != ErrorCode::not_found) found.problems.push_back(text.error().describe());
+      if (text.error().code == ErrorCode::not_found) continue;
+      found.problems.push_back(text.error().describe());
+      found.damaged.set(file);
       continue;
     }
     auto image = decode_retain(*text);
     if (!image) {
-      found.problems.push_back(fmt::format("{}: {}", path(file), image.error().message));
+      found.problems.push_back(
+          fmt::format("{}: {}; it is put aside as .old", path(file), image.error().message));
+      found.damaged.set(file);
     } else if (!found.newest || image->generation > found.newest->generation) {
       found.newest = *std::move(image);
     }
@@ -102,8 +106,9 @@ Result<void> RetainFiles::write(const RetainImage& image) {
   return sync_directory(directory_);
 }
 
-void RetainFiles::put_aside() const {
+void RetainFiles::put_aside(std::bitset<2> which) const {
   for (std::uint64_t file = 0; file < 2; ++file) {
+    if (!which[file]) continue;
     std::error_code error;  // one that is not there needs no place
     std::filesystem::copy_file(path(file), path(file) + ".old",
                                std::filesystem::copy_options::overwrite_existing, error);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -27,6 +28,7 @@ class RetainFiles {
   struct Found {
     std::optional<RetainImage> newest;  ///< of those that are whole
     std::vector<std::string> problems;  ///< files that are there and are not
+    std::bitset<2> damaged;             ///< which these are
   };
   [[nodiscard]] Found read() const;
   /// The same without having the files: another process may write them meanwhile.
@@ -36,8 +38,8 @@ class RetainFiles {
   /// that may wait for a disk.
   [[nodiscard]] Result<void> write(const RetainImage& image);
 
-  /// Puts what there is aside, under INSTANCE.retain.0.old and .1.old. Set-up.
-  void put_aside() const;
+  /// Puts copies of those files aside, under INSTANCE.retain.0.old and .1.old. Set-up.
+  void put_aside(std::bitset<2> which) const;
 
  private:
   RetainFiles(std::string stem, std::string directory)

@@ -1,6 +1,7 @@
 #include "instances/runtime/memory/retain_keeper.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <thread>
 #include <utility>
 
@@ -38,7 +39,7 @@ struct RetainKeeper::Start {
   std::optional<RetainFiles> files;
   std::optional<RetainImage> source;  // the values to go on with
   Origin origin = PLC_AREA_INITIAL;   // of those
-  bool aside = false;                 // the files are of another layout
+  std::bitset<2> aside;               // files that are damaged, or of another layout
   std::uint64_t generation = 0;       // the highest that was used
   std::vector<std::byte> written;     // the contents of the newest file
   RetainImage image;                  // the wanted contents of the memory
@@ -67,6 +68,7 @@ struct RetainKeeper::Start {
                                     left.error().describe()));
     }
     for (std::string& problem : found.problems) remarks.push_back(std::move(problem));
+    aside = found.damaged;
     if (found.newest) {
       generation = found.newest->generation;
       written = found.newest->data;
@@ -97,7 +99,7 @@ struct RetainKeeper::Start {
                            "the files");
       case RetainMismatch::initialise:
         remarks.push_back(why + ": all begin with their initial values; the files are put aside as .old");
-        aside = true;
+        aside.set();
         source.reset();
         break;
       case RetainMismatch::ignore:
@@ -164,7 +166,7 @@ Result<void> RetainKeeper::start() {
     PLCHOST_TRY_ASSIGN(thread_, Thread::start("retain", {}, [this] { run(); }));
   }
   // Before the memory of then is replaced: a start after a kill finds nothing to put aside.
-  if (aside_ && files_) files_->put_aside();
+  if (files_) files_->put_aside(aside_);
   if (auto published = memory_.publish(pool_, name_); !published) return published;
   save_first();
   const std::lock_guard lock(mutex_);
@@ -343,7 +345,7 @@ void RetainKeeper::put_strange_files_aside() {
   if (!found.newest || found.newest->generation <= image_.generation) return;
   spdlog::warn(
       "retain variables: files were found that could not be read at the start; they are put aside as .old");
-  files_->put_aside();
+  files_->put_aside(std::bitset<2>().set());
   image_.generation = found.newest->generation;
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <bitset>
 #include <condition_variable>
 #include <cstdint>
 #include <memory>
@@ -99,7 +100,7 @@ class RetainKeeper {
   ObjectPool& pool_;
   std::string name_;  // of the memory
   RetainMemory memory_;
-  bool aside_;  // the files are of another layout, and are put aside
+  std::bitset<2> aside_;  // files that are damaged, or of another layout
   std::optional<RetainFiles> files_;
   std::vector<Origin> origins_;
   std::vector<std::string> remarks_;

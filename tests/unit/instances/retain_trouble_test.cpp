@@ -164,6 +164,18 @@ TEST_F(RetainInTrouble, AFolderThatComesLateWithFilesKeepsThemAside) {
   EXPECT_EQ(value(0), 7U);
 }
 
+TEST_F(RetainInTrouble, AFileThatIsDamagedIsPutAsideBeforeAnotherTakesItsPlace) {
+  save_42();
+  sut.reset();
+  forget_memory();
+  std::ofstream(folder_ / "line1.retain.1") << "no values";
+  start_well();
+  EXPECT_EQ(value(0), 42U);
+  EXPECT_THAT(sut->remarks(), testing::ElementsAre(HasSubstr("line1.retain.1: ")));
+  EXPECT_EQ(fs::file_size(folder_ / "line1.retain.1.old"), 9U);
+  EXPECT_FALSE(fs::exists(folder_ / "line1.retain.0.old")) << "it is whole";
+}
+
 TEST_F(RetainInTrouble, AFolderThatHasGoneWhileItRunsIsToldOnce) {
   start_well({.interval = std::chrono::milliseconds(10)});
   fs::rename(folder_, folder_.string() + ".away");
