@@ -42,6 +42,15 @@ bool says_asleep(std::string_view stat) noexcept {
   return state == 'S' || state == 'D' || state == 'I';
 }
 
+// "1234 567 8": it ran for 1234 ns, and was ready for 567 ns.
+Duration ready_time_in(std::string_view schedstat) noexcept {
+  const std::size_t second = schedstat.find(' ') + 1;
+  Duration::rep ready = 0;
+  if (second > 0)
+    (void)std::from_chars(schedstat.data() + second, schedstat.data() + schedstat.size(), ready);
+  return Duration(ready);
+}
+
 // A file of /proc/self/task, as much of it as fits.
 template <std::size_t Size>
 std::string_view read_of_thread(pid_t thread, const char* file, std::array<char, Size>& text) noexcept {
@@ -99,6 +108,10 @@ class LinuxProcessorTimes final : public ProcessorTimes {
   [[nodiscard]] Duration of_process() const noexcept override { return used(CLOCK_PROCESS_CPUTIME_ID); }
   [[nodiscard]] Duration of_thread(pid_t thread) const noexcept override {
     return used(thread_clock(thread));
+  }
+  [[nodiscard]] Duration ready_time_of_thread(pid_t thread) const noexcept override {
+    std::array<char, 96> schedstat{};
+    return ready_time_in(read_of_thread(thread, "schedstat", schedstat));
   }
   [[nodiscard]] bool sleeps(pid_t thread) const noexcept override {
     std::array<char, 128> stat{};

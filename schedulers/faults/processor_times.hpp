@@ -22,6 +22,10 @@ class ProcessorTimes {
   [[nodiscard]] virtual Duration of_process() const noexcept = 0;
   /// One thread of this process; 0 if it has ended. Real-time, a system call.
   [[nodiscard]] virtual Duration of_thread(pid_t thread) const noexcept = 0;
+  /// So long a thread of this process has been ready while others had the processor, since its start; a wait
+  /// that goes on counts when it has ended. 0: it has ended, or the kernel does not count. Three system
+  /// calls.
+  [[nodiscard]] virtual Duration ready_time_of_thread(pid_t thread) const noexcept = 0;
   /// One thread of this process waits for something else than the processor. Real-time, three system calls.
   [[nodiscard]] virtual bool sleeps(pid_t thread) const noexcept = 0;
   /// The threads of this process with a real-time priority, as many as `found` has room for; how many that

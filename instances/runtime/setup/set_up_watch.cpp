@@ -53,12 +53,13 @@ std::optional<ProcessorGuard::Taker> LongRunSearch::look(TimePoint now) {
   std::map<pid_t, Run> before = std::exchange(runs_, {});
   std::optional<ProcessorGuard::Taker> taker;
   for (const pid_t thread : std::span(found).first(count)) {
-    const Duration used = times_.of_thread(thread);
-    const Run anew{.began = now, .used_before = used};
+    // Others that take the processor from it give it no pause.
+    const Duration busy = times_.of_thread(thread) + times_.ready_time_of_thread(thread);
+    const Run anew{.began = now, .busy_before = busy};
     const auto known = before.find(thread);
     Run run = known != before.end() ? known->second : anew;
     const Duration lasted = now - run.began;
-    if (used - run.used_before < lasted - lasted / kPart) run = anew;
+    if (busy - run.busy_before < lasted - lasted / kPart) run = anew;
     if (now - run.began > limit_ && !taker && concerns_(thread)) {
       if (const ThreadText who = times_.demote(thread); !who.view().empty()) {
         taker = {.who = who, .lasted = now - run.began};

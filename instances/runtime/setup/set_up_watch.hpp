@@ -39,7 +39,7 @@ class LongRunSearch {
   /// The longest run up to the last look in which the thread has done next to nothing else.
   struct Run {
     TimePoint began;
-    Duration used_before{};  // by the thread, when that began
+    Duration busy_before{};  // of the thread, when that began
   };
 
   const ProcessorTimes& times_;

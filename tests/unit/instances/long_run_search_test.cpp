@@ -18,6 +18,10 @@ class ThreadsInSetUp final : public ProcessorTimes {
  public:
   [[nodiscard]] Duration of_process() const noexcept override { return {}; }
   [[nodiscard]] Duration of_thread(pid_t thread) const noexcept override { return used.at(thread); }
+  [[nodiscard]] Duration ready_time_of_thread(pid_t thread) const noexcept override {
+    const auto known = ready.find(thread);
+    return known == ready.end() ? Duration::zero() : known->second;
+  }
   [[nodiscard]] bool sleeps(pid_t) const noexcept override { return false; }
   [[nodiscard]] std::size_t real_time_threads(std::span<pid_t> found) const noexcept override {
     std::size_t count = 0;
@@ -32,6 +36,7 @@ class ThreadsInSetUp final : public ProcessorTimes {
   }
 
   std::map<pid_t, Duration> used;
+  std::map<pid_t, Duration> ready;
   mutable std::vector<pid_t> demoted;
 };
 
@@ -81,6 +86,14 @@ TEST_F(LongRun, IsFoundThoughTheKernelStopsRealTimeThreadsFor50MsOfEachSecond) {
 // The kernel leaves 50 ms of each second to threads without real-time priority: the looks are that far apart.
 TEST_F(LongRun, IsFoundByLooksThatComeLate) {
   EXPECT_TRUE(looks(4, {{7, 95}}, milliseconds(1000)));
+}
+
+// Threads above it, also of other programs: with them it takes all of the processor.
+TEST_F(LongRun, IsFoundThoughOthersTakeAThirdOfTheProcessorFromIt) {
+  for (int i = 0; i < 22; ++i) {
+    threads_.ready[7] += milliseconds(17);
+    EXPECT_EQ(looks(1, {{7, 66}}).has_value(), i == 21);
+  }
 }
 
 TEST_F(LongRun, OfAThreadOnAnotherCoreTakesNothing) {

@@ -25,6 +25,7 @@ class FakeTimes final : public ProcessorTimes {
     const auto found = threads.find(thread);
     return found == threads.end() ? Duration::zero() : found->second;
   }
+  [[nodiscard]] Duration ready_time_of_thread(pid_t) const noexcept override { return {}; }
   [[nodiscard]] bool sleeps(pid_t) const noexcept override { return false; }
   [[nodiscard]] std::size_t real_time_threads(std::span<pid_t>) const noexcept override { return 0; }
   [[nodiscard]] ThreadText demote(pid_t) const noexcept override { return {}; }

@@ -28,6 +28,7 @@ class FakeThreads final : public ProcessorTimes {
     const auto found = threads.find(thread);
     return found == threads.end() ? Duration::zero() : found->second;
   }
+  [[nodiscard]] Duration ready_time_of_thread(pid_t) const noexcept override { return {}; }
   [[nodiscard]] bool sleeps(pid_t) const noexcept override { return asleep; }
   [[nodiscard]] std::size_t real_time_threads(std::span<pid_t> found) const noexcept override {
     std::size_t count = 0;

@@ -18,6 +18,7 @@ class FakeUse final : public ProcessorTimes {
  public:
   [[nodiscard]] Duration of_process() const noexcept override { return used; }
   [[nodiscard]] Duration of_thread(pid_t) const noexcept override { return used; }
+  [[nodiscard]] Duration ready_time_of_thread(pid_t) const noexcept override { return {}; }
   [[nodiscard]] bool sleeps(pid_t) const noexcept override { return asleep; }
   [[nodiscard]] std::size_t real_time_threads(std::span<pid_t>) const noexcept override { return 0; }
   [[nodiscard]] ThreadText demote(pid_t) const noexcept override { return {}; }
