@@ -116,8 +116,9 @@ typedef struct {
  * name, after plc_app_init has returned. Control. */
 void CDECL __sys__setup__tasks(sys_setup_tasks_struct* p);
 
-#define PLC_LATE_NEXT 0 /* a late cyclic task waits for the next point of its grid */
-#define PLC_LATE_ASAP 1 /* a late cyclic task runs at once, for the last release that it missed */
+/* Of releases that passed while a cyclic task was busy. A cycle that is woken late begins at once anyway. */
+#define PLC_LATE_NEXT 0 /* all are lost: it waits for the next point of its grid */
+#define PLC_LATE_ASAP 1 /* it runs at once for the last of them */
 
 #define PLC_WATCHDOG_APPLICATION 0 /* a hit puts the whole application into exception */
 #define PLC_WATCHDOG_TASK 1        /* a hit puts only the task into exception */

@@ -32,10 +32,11 @@ constexpr std::array kWishTexts = {
     WishMember<std::string>{"configured_application", &InstanceWish::configured_application},
     WishMember<std::string>{"configured_scheduler", &InstanceWish::configured_scheduler},
     WishMember<std::string>{"configured_process", &InstanceWish::configured_process}};
-// Empty where an older manager has written the wish.
+// Empty, or false, where an older manager has written the wish.
 constexpr std::array kLaterWishTexts = {
     WishMember<std::string>{"application_before", &InstanceWish::application_before},
     WishMember<std::string>{"taken_back", &InstanceWish::taken_back}};
+constexpr std::array kLaterWishFlags = {WishMember<bool>{"stopping", &InstanceWish::stopping}};
 constexpr std::array kWishFlags = {WishMember<bool>{"commanded", &InstanceWish::commanded},
                                    WishMember<bool>{"running", &InstanceWish::running},
                                    WishMember<bool>{"offline", &InstanceWish::offline},
@@ -82,6 +83,9 @@ bool take_all(const Json& json, InstanceWish& wish) {
   for (const auto& text : kLaterWishTexts) {
     whole = whole && (!json.contains(text.key) || take(json, text.key, wish.*text.member));
   }
+  for (const auto& flag : kLaterWishFlags) {
+    whole = whole && (!json.contains(flag.key) || take(json, flag.key, wish.*flag.member));
+  }
   for (const auto& flag : kWishFlags) whole = whole && take(json, flag.key, wish.*flag.member);
   for (const auto& number : kWishNumbers) whole = whole && take(json, number.key, wish.*number.member);
   std::uint32_t kind = 0;
@@ -112,6 +116,7 @@ std::string encode(const InstanceWish& wish) {
             {"crashes_unix_ns", wish.crashes_unix_ns}};
   for (const auto& text : kWishTexts) json[text.key] = std::string(cut(wish.*text.member, kMaxWishText));
   for (const auto& text : kLaterWishTexts) json[text.key] = std::string(cut(wish.*text.member, kMaxWishText));
+  for (const auto& flag : kLaterWishFlags) json[flag.key] = wish.*flag.member;
   for (const auto& flag : kWishFlags) json[flag.key] = wish.*flag.member;
   for (const auto& number : kWishNumbers) json[number.key] = wish.*number.member;
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);

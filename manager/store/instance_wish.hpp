@@ -24,6 +24,7 @@ struct InstanceWish {
 
   bool commanded = false;  ///< an operator has started or stopped it; else `autostart` decides
   bool running = true;     ///< its application is to run
+  bool stopping = false;   ///< an operator's stop is under way: its end was not seen
   bool offline = false;    ///< it is to have no process
   bool failed = false;     ///< its policy has given it up
   std::string problem;     ///< why it failed

@@ -60,6 +60,19 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
     set_state(phase_, status_.state, text);
   }
   spdlog::info("instance {}: adopted process {}", config_.name, status_.pid);
+  go_on_with_stop();
+}
+
+void ManagedInstance::go_on_with_stop() {
+  const bool begun = earlier_ && std::exchange(earlier_->stopping, false);
+  if (!begun || operation_ || wants_running_ || status_.state != InstanceState::running) return;
+  spdlog::info("instance {}: stop, which an earlier manager has begun", config_.name);
+  Operation stop{.request = {}, .reply = [](const ControlReply&) {}};
+  stop.request.verb = ControlVerb::stop;
+  stop.request.instance = config_.name;
+  stop.of_predecessor = true;
+  operation_ = std::move(stop);
+  begin_stop();
 }
 
 void ManagedInstance::learn(const InstanceRuntime& said) {

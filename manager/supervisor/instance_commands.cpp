@@ -32,6 +32,11 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
     return begin_order(std::move(checked), std::move(reply));
   }
+  if (operation_ && operation_->of_predecessor && checked.verb == operation_->request.verb) {
+    operation_->request.number = request.number;  // the client asks again for what goes on already
+    operation_->reply = std::move(reply);
+    return;
+  }
   if (!makes_room_for(checked.verb)) {
     return refuse(ErrorCode::busy, fmt::format("instance '{}' is busy with '{}'; try again when it is done",
                                                config_.name, to_string(operation_->request.verb)));

@@ -145,8 +145,12 @@ void ManagedInstance::ended(End end, const std::string& why) {
   last_end_ = why;
   std::string later;
   if (decision.action == Decision::Action::back_off) {
-    later = fmt::format("; starts again{} {} ms later", history_.safe_mode ? " in safe mode" : "",
-                        std::chrono::ceil<std::chrono::milliseconds>(decision.delay).count());
+    if (decision.crash && !history_.safe_mode) {
+      later = fmt::format("; crash {} of {} within {} s", history_.crashes.size(), config_.crash_limit,
+                          std::chrono::ceil<std::chrono::seconds>(config_.crash_window).count());
+    }
+    later += fmt::format("; starts again{} {} ms later", history_.safe_mode ? " in safe mode" : "",
+                         std::chrono::ceil<std::chrono::milliseconds>(decision.delay).count());
   }
   carry_out(decision, why + later);
   if (!operation_ || loading_aside()) return;

@@ -202,6 +202,8 @@ InstanceWish ManagedInstance::wish() const {
   InstanceWish wish;
   wish.commanded = commanded_;
   wish.running = wants_running_;
+  wish.stopping =
+      (earlier_ && earlier_->stopping) || (operation_ && operation_->request.verb == ControlVerb::stop);
   wish.failed = phase_ == Phase::down && status_.state == InstanceState::failed;
   // That the configuration has lost it is nobody's stop.
   wish.offline = phase_ == Phase::down && !wish.failed && !(removed_ && wants_running_);

@@ -196,6 +196,7 @@ class ManagedInstance : public InstanceEvents {
     std::string refused{};          // why what was to be loaded did not come up; empty: it did
     bool commanded_before = false;  // of a stop: the wish that it took the place of
     bool wanted_before = true;
+    bool of_predecessor = false;  // nobody awaits its answer, unless its client asks again
   };
   struct ForwardedOrder {
     ControlRequest request;
@@ -298,6 +299,8 @@ class ManagedInstance : public InstanceEvents {
   void watch_adoption();
   void adoption_timed_out();
   /// The report of the process replaces the assumptions about it.
+  /// A stop that its predecessor began may not have reached the process.
+  void go_on_with_stop();
   void learn(const InstanceRuntime& said);
 
   // Life: managed_instance.cpp

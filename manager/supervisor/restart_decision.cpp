@@ -117,6 +117,7 @@ Decision decide(const End& end, const RestartHistory& history, const InstanceCon
   Decision made{.action = action_of(row, end, policy),
                 .runs = end.order == Order::none || end.order == Order::run,
                 .delay = Duration::zero(),
+                .crash = false,
                 .history = history};
   // An operator has taken matters in hand.
   if (row.counts == DecisionRow::Counts::forget) made.history = {};
@@ -124,10 +125,8 @@ Decision decide(const End& end, const RestartHistory& history, const InstanceCon
   if ((crash || row.counts == DecisionRow::Counts::end) && made.action != Action::start_earlier) {
     count(made.history, end, crash, policy);
   }
-  if (crash && policy.restart != RestartPolicy::never && made.action != Action::start_earlier &&
-      made.history.crashes.size() >= policy.crash_limit) {
-    made.history.safe_mode = true;
-  }
+  made.crash = crash && policy.restart != RestartPolicy::never && made.action != Action::start_earlier;
+  if (made.crash && made.history.crashes.size() >= policy.crash_limit) made.history.safe_mode = true;
   if (made.action == Action::back_off) made.delay = delay_after(made.history, policy);
   if (made.action == Action::await_process) made.delay = policy.restart_delay;
   return made;

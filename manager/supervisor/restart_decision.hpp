@@ -104,8 +104,9 @@ struct Decision {
     fail,            ///< it stays without a process, and says why
   };
   Action action = Action::leave;
-  bool runs = true;  ///< the application begins by itself in the next process
-  Duration delay{};  ///< of back_off; of await_process: the interval of the looks for it
+  bool runs = true;    ///< the application begins by itself in the next process
+  Duration delay{};    ///< of back_off; of await_process: the interval of the looks for it
+  bool crash = false;  ///< the end counts towards safe mode
   RestartHistory history;
 
   bool operator==(const Decision&) const = default;

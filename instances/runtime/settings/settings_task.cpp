@@ -22,10 +22,11 @@ template <auto kOption, auto kMember>
 using TaskWatchdogAt = AtTask<kOption, &TaskOptions::watchdog, kMember>;
 
 constexpr std::array kTaskKeys = {
-    SettingKey{.section = kTaskSections,
-               .name = "LatePolicy",
-               .meaning = "a late cycle: at the next release of the grid, or immediately",
-               .value = word_setting<AtTask<&TaskSettings::late, &TaskOptions::late>>(kLatePolicies)},
+    SettingKey{
+        .section = kTaskSections,
+        .name = "LatePolicy",
+        .meaning = "releases that passed while the task was busy: all lost, or the last one runs at once",
+        .value = word_setting<AtTask<&TaskSettings::late, &TaskOptions::late>>(kLatePolicies)},
     SettingKey{
         .section = kTaskSections,
         .name = "StartOffsetNs",

@@ -1,4 +1,6 @@
 // The life cycle of an application through a real manager.
+#include <csignal>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -10,6 +12,16 @@ namespace plchost {
 namespace {
 
 using testing::HasSubstr;
+
+/// Asks to stop, and does not wait for the answer.
+PacketSocket begin_stop(Plant& plant) {
+  PacketSocket socket = plant.connect();
+  EXPECT_TRUE(socket.send(
+      encode(ControlRequest{.number = 1, .verb = ControlVerb::stop, .instance = "line1", .argument = ""})));
+  // On a slow machine the time of the stop may be over already.
+  EXPECT_TRUE(Plant::eventually([&] { return plant.status("line1").state != InstanceState::running; }));
+  return socket;
+}
 
 // The application holds the cycle of its task Output, which drives outputs, until it is let go.
 class HeldPlant {
@@ -24,15 +36,7 @@ class HeldPlant {
     EXPECT_EQ(post("hold_output"), PostResult::posted);
     EXPECT_TRUE(plant_.wait_for_cycles("line1", 20));  // of others: Output comes before them
   }
-  /// Asks to stop, and does not wait for the answer.
-  PacketSocket begin_stop() {
-    PacketSocket socket = plant_.connect();
-    EXPECT_TRUE(socket.send(
-        encode(ControlRequest{.number = 1, .verb = ControlVerb::stop, .instance = "line1", .argument = ""})));
-    // On a slow machine the time of the stop may be over already.
-    EXPECT_TRUE(Plant::eventually([&] { return plant_.status("line1").state != InstanceState::running; }));
-    return socket;
-  }
+  PacketSocket begin_stop() { return plchost::begin_stop(plant_); }
   /// In the first phase the other tasks run on.
   void let_go() { EXPECT_EQ(post("let_go"), PostResult::posted); }
   Plant& plant() { return plant_; }
@@ -61,6 +65,22 @@ TEST(ManagerLife, GoesOnWithAStopThatItsPredecessorDidNotSeeTheEndOf) {
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::ok);
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+TEST(ManagerLife, CarriesOutAStopThatHasNotReachedTheProcess) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const int pid = plant.status("line1").pid;
+  ASSERT_EQ(::kill(pid, SIGSTOP), 0);
+  const PacketSocket asker = begin_stop(plant);
+  plant.kill_manager();
+  ASSERT_EQ(::kill(pid, SIGCONT), 0);
+  plant.start_manager();
+  EXPECT_TRUE(plant.wait_for("line1", InstanceState::stopped));
+  EXPECT_EQ(plant.status("line1").pid, pid);
+  EXPECT_THAT(plant.log(), HasSubstr("instance line1: stop, which an earlier manager has begun"));
 }
 
 TEST(ManagerLife, ShowsTheExceptionOfAStopThatItsPredecessorBegan) {

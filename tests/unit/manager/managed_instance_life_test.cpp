@@ -329,7 +329,7 @@ TEST_F(ManagedLife, CountsTheSameExitCodeAsACrashAfterTheFirstStep) {
   sut().on_report({.step = SetupStep::bind_core, .code = ErrorCode::ok, .text = ""});
   sut().on_exit(exited_with(kExitNotLoaded));
   EXPECT_EQ(state(), InstanceState::waiting);
-  EXPECT_THAT(problem(), HasSubstr("exit code 127; starts again"));
+  EXPECT_THAT(problem(), HasSubstr("exit code 127; crash 1 of 3 within 10 s; starts again"));
 }
 
 TEST_F(ShortOfSomething, OfProcessesIsTriedAgain) {

@@ -136,7 +136,8 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_F(ManagedInstanceTest, SaysThatNobodyAskedForAnExitWithoutError) {
   bring_up();
   sut().on_exit(exited_with(0));
-  EXPECT_EQ(problem(), "exit code 0, which nobody asked for; starts again 100 ms later");
+  EXPECT_EQ(problem(),
+            "exit code 0, which nobody asked for; crash 1 of 3 within 10 s; starts again 100 ms later");
   expire_timer();
   EXPECT_EQ(host_.spawned.back().start_kind, StartKind::after_fault);
 }
@@ -144,7 +145,7 @@ TEST_F(ManagedInstanceTest, SaysThatNobodyAskedForAnExitWithoutError) {
 TEST_F(ManagedInstanceTest, ComesBackAfterTheDelayAndCountsIt) {
   bring_up();
   sut().on_exit(killed_by(SIGKILL));
-  EXPECT_EQ(problem(), "killed by SIGKILL; starts again 100 ms later");
+  EXPECT_EQ(problem(), "killed by SIGKILL; crash 1 of 3 within 10 s; starts again 100 ms later");
   EXPECT_EQ(*host_.timer - now_, milliseconds(100));
   EXPECT_EQ(sut().status().restarts, 0U);
   expire_timer();
@@ -233,7 +234,8 @@ TEST_F(ManagedInstanceTest, AdoptsAProcessAsItIs) {
   EXPECT_EQ(problem(), "");
   EXPECT_TRUE(host_.spawned.empty());
   sut().on_exit({.known = false});
-  EXPECT_EQ(problem(), "ended (status unknown: it was adopted); starts again 100 ms later");
+  EXPECT_EQ(problem(),
+            "ended (status unknown: it was adopted); crash 1 of 3 within 10 s; starts again 100 ms later");
 }
 
 TEST_F(ManagedInstanceTest, LeavesAnAdoptedProcessThatDoesNotAnswerAlive) {

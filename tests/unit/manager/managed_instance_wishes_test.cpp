@@ -344,10 +344,35 @@ TEST_F(AdoptedWishes, OfAStopThatWasUnderWayHold) {
   bring_up();
   ask(ControlVerb::stop);
   adopt_with(ApplicationState::running);
-  EXPECT_EQ(state(), InstanceState::running);  // the stop has not reached it
+  EXPECT_EQ(state(), InstanceState::stopping);
   sut().on_exit(ExitStatus{.known = false});
   expire_timer();
   EXPECT_TRUE(host_.spawned.back().stopped);
+}
+
+TEST_F(AdoptedWishes, OfAStopThatHasNotReachedTheProcessAreCarriedOut) {
+  bring_up();
+  ask(ControlVerb::stop);
+  adopt_with(ApplicationState::running);
+  ASSERT_EQ(host_.requests.back().verb, ControlVerb::stop);
+  EXPECT_TRUE(wishes_.wish->stopping) << "the next manager goes on with it, too";
+  ask(ControlVerb::stop);  // the client repeats it
+  EXPECT_EQ(host_.requests.size(), 3U) << "two stops and a status";
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  EXPECT_EQ(state(), InstanceState::stopped);
+  EXPECT_FALSE(wishes_.wish->stopping);
+}
+
+TEST_F(AdoptedWishes, OfAStopThatIsDoneStopNoApplicationThatRunsAgain) {
+  bring_up();
+  ask(ControlVerb::stop);
+  answer();
+  take_reply();
+  ask(ControlVerb::start);  // it runs, and its manager ends before it learns that
+  adopt_with(ApplicationState::running);
+  EXPECT_NE(host_.requests.back().verb, ControlVerb::stop);
+  EXPECT_EQ(state(), InstanceState::running);
 }
 
 TEST_F(AdoptedWishes, OfAnApplicationThatStoppedByItselfAreToRun) {
