@@ -19,10 +19,11 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kShow{50};          // how fine the ages are
 constexpr milliseconds kRepairPause{500};  // images whose file was removed
-// Together below a second. At first a device that answers puts its outputs into their safe state; a thread
-// that still waits then is interrupted.
+// At first a device that answers puts its outputs into their safe state; a thread on TCP that still waits
+// then is interrupted. The devices of a serial line take turns, which cannot be.
 constexpr milliseconds kSafeStateTime{600};
 constexpr milliseconds kInterruptTime{250};
+constexpr milliseconds kLineTime{10'000};
 
 }  // namespace
 
@@ -94,6 +95,15 @@ bool ModbusProcess::stop() {
   if (!ended) {
     for (const auto& [name, line] : lines_) line->interrupt();
     ended = join_until(now + kSafeStateTime + kInterruptTime);
+  }
+  const auto at_line = [](const DeviceConfig& device) { return !device.serial.empty(); };
+  if (!ended && std::ranges::any_of(config_.devices, at_line)) {
+    show(MonotonicClock::now(), true);
+    ended = join_until(now + kLineTime);
+  }
+  for (const auto& device : devices_) {
+    if (!ended && !device->has_ended())
+      spdlog::warn("device '{}' has not ended in time: its outputs may stay as they are", device->name());
   }
   show(MonotonicClock::now(), true);
   if (ended) threads_.clear();

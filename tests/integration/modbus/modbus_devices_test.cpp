@@ -152,7 +152,41 @@ TEST(ModbusDevices, APlcThatDiesInItsSilenceSwitchesNothingOnAgain) {
   const int requests = peer.requests();
   ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));  // of 10 ms and more
   EXPECT_EQ(peer.holding(7), 0);
+  plant.run();
   EXPECT_TRUE(follows(plant, peer, 98)) << "of its next process";
+}
+
+// A watchdog that hits, the next process and the end come behind the silence.
+TEST(ModbusDevices, KeptOutputsThatSilenceHasClearedAreNotSwitchedOnAgain) {
+  for (const unsigned state :
+       {PLC_IMAGE_STATE_STOPPED, PLC_IMAGE_STATE_EXCEPTION, PLC_IMAGE_STATE_HALTED, PLC_IMAGE_STATE_ENDED}) {
+    Plant plant;
+    const HeldPort port;
+    ModbusPeer peer(port);
+    const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
+    ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
+    plant.keep(state);
+    const int before = peer.requests();
+    ASSERT_TRUE(eventually([&] {
+      plant.beat();
+      return peer.requests() > before + 100;
+    }));
+    if (!sut.logged("is silent")) ASSERT_EQ(peer.holding(7), 99) << "without a silence they are kept";
+    plant.show_safe(PLC_IMAGE_STATE_RUNNING, 99, false);
+    ASSERT_TRUE(eventually([&] { return peer.holding(7) == 0; }));
+    plant.keep(state);
+    const int requests = peer.requests();
+    ASSERT_TRUE(eventually([&] {
+      plant.beat();
+      return peer.requests() > requests + 100;  // of 10 ms and more
+    }));
+    EXPECT_EQ(peer.holding(7), 0) << state;
+    plant.show_safe(PLC_IMAGE_STATE_EXCEPTION, 7);
+    EXPECT_TRUE(eventually([&] {
+      plant.beat();
+      return peer.holding(7) == 7;
+    })) << "values that the settings name hold";
+  }
 }
 
 // The end of a host removes its images.
@@ -236,6 +270,20 @@ TEST(ModbusDevices, InputsOfALostDeviceStayWithTheirAge) {
   peer.set(Mode::normal);
   EXPECT_TRUE(
       eventually([&] { return plant.status(56).age_ms < 1000 && quality_is(plant, 56, Quality::good); }));
+}
+
+// It may have looked at its inputs as soon as it was asked.
+TEST(ModbusDevices, TheAgeOfInputsCountsFromTheirRequest) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, ModbusPeer::Mode::slow);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); })) << sut.log();
+  const int requests = peer.requests();
+  ASSERT_TRUE(eventually([&] {
+    EXPECT_GE(std::int64_t{plant.status(56).age_ms}, ModbusPeer::kSlow.count());
+    return peer.requests() > requests + 10;
+  }));
 }
 
 TEST(ModbusDevices, GarbageIsALostDevice) {

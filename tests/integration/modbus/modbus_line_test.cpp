@@ -1,8 +1,10 @@
 // Devices at a serial line, which a pair of terminals of the kernel is here.
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -73,7 +75,6 @@ TEST(ModbusLine, ADeviceThatIsNotAtTheLineLeavesItToTheOthers) {
   }
 }
 
-// A wait at a serial line cannot be interrupted: the process ends without that thread.
 TEST(ModbusLine, TheEndWaitsForNoSilentDevice) {
   Plant plant;
   const SerialLine line;
@@ -83,9 +84,80 @@ TEST(ModbusLine, TheEndWaitsForNoSilentDevice) {
   pollfd asked{.fd = line.other_end(), .events = POLLIN, .revents = 0};
   ASSERT_EQ(::poll(&asked, 1, 40'000), 1) << sut.log();
   EXPECT_EQ(sut.end(SIGTERM), 0);
-  EXPECT_FALSE(sut.logged("timed out")) << sut.log();
-  EXPECT_TRUE(sut.logged("a device keeps its thread"));
+  EXPECT_FALSE(sut.logged("a device keeps its thread")) << sut.log();
   EXPECT_EQ(plant.status(40).quality, 0);
+}
+
+// The silent one has the line most of the time.
+TEST(ModbusLine, TheEndReachesADeviceBesideASilentOne) {
+  Plant plant;
+  const SerialLine line;
+  ModbusPeer peer(line, 1);
+  std::string silent = serial_device(line, 2, 8);
+  silent.replace(silent.find("timeout_ms = 200"), 16, "timeout_ms = 3000");
+  ModbusProgram sut(plant, plant.write(serial_device(line, 1, 0) + silent));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 815);
+    return peer.holding(1) == 815 && quality_is(plant, 48, Quality::lost);
+  })) << sut.log();
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it is asked again
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  EXPECT_TRUE(eventually([&] { return peer.holding(1) == 0; })) << sut.log();
+  EXPECT_FALSE(sut.logged("a device keeps its thread"));
+}
+
+// Devices of a line take turns, which may take longer together than those on TCP have.
+TEST(ModbusLine, TheEndReachesAllOutputsOfALine) {
+  constexpr int kMaps = 20;  // of 60 ms and more each
+  Plant plant;
+  const SerialLine line;
+  ModbusPeer peer(line, 1);
+  std::string text = serial_device(line, 1, 0);
+  text.replace(text.find("timeout_ms = 200"), 16, "timeout_ms = 2000\nsilent_after_ms = 60000");
+  for (int i = 0; i < kMaps; ++i) {
+    text += fmt::format("[[device.write]]\nkind = \"holding_register\"\naddress = {}\nimage = \"t.out\"\n",
+                        200 + i);
+  }
+  ModbusProgram sut(plant, plant.write(text));
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 815);
+    return peer.holding(200 + kMaps - 1) == 815;
+  })) << sut.log();
+  peer.set(ModbusPeer::Mode::slow);
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+  EXPECT_TRUE(eventually([&] { return peer.holding(200 + kMaps - 1) == 0; })) << sut.log();
+  EXPECT_FALSE(sut.logged("a device keeps its thread"));
+}
+
+// RTU has no number of a request: only the kind of a response tells which one it belongs to.
+TEST(ModbusLine, ADeviceThatAnswersOneRequestTooLateIsLost) {
+  Plant plant;
+  const SerialLine line;
+  ModbusPeer peer(line, 1);
+  peer.with([&](modbus_mapping_t& mapping) {
+    mapping.tab_input_registers[100] = 11;
+    mapping.tab_input_registers[110] = 22;
+  });
+  std::string text = serial_device(line, 1, 0);
+  text.resize(text.find("[[device.read]]"));
+  for (const int map : {0, 1}) {
+    text += fmt::format(
+        "[[device.read]]\nkind = \"input_register\"\naddress = {}\ncount = 2\nimage = \"t.in\"\noffset = "
+        "{}\n",
+        100 + 10 * map, 4 * map);
+  }
+  const ModbusProgram sut(plant, plant.write(text));
+  const auto are_right = [&] { return plant.input_word(0) == 11 && plant.input_word(4) == 22; };
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::good) && are_right(); })) << sut.log();
+  peer.set(ModbusPeer::Mode::late);
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::lost); })) << sut.log();
+  const int requests = peer.requests();
+  ASSERT_TRUE(eventually([&] {
+    EXPECT_TRUE(are_right()) << plant.input_word(0) << ' ' << plant.input_word(4);
+    return HasFailure() || peer.requests() > requests + 10;
+  })) << sut.log();
+  peer.set(ModbusPeer::Mode::normal);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::good) && are_right(); })) << sut.log();
 }
 
 TEST(ModbusLine, ALineThatIsNotThereIsTriedAgain) {

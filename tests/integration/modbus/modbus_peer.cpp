@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <arpa/inet.h>
@@ -197,12 +198,21 @@ bool ModbusPeer::answer(int fd, Request& request, int size) {
       request[7] |= 0x80U;
       request[8] = kOwnException;
       return ::send(fd, request.data(), 9, MSG_NOSIGNAL) > 0;
+    case Mode::slow:
+      std::this_thread::sleep_for(kSlow);
+      break;
+    case Mode::late:
+      std::swap(held_, request);
+      std::swap(held_size_, size);
+      if (size == 0) return true;
+      break;
     case Mode::ends:
       return modbus_reply(context_, request.data(), size, mapping_) < 0;
     case Mode::echoes:
     case Mode::normal:
       break;
   }
+  if (mode_ != Mode::late) held_size_ = 0;
   const bool replied = modbus_reply(context_, request.data(), size, mapping_) >= 0;
   if (mode_ == Mode::echoes) {
     std::copy_n(mapping_->tab_registers, kRegisters, mapping_->tab_input_registers);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -46,6 +47,7 @@ class ModbusPeer {
  public:
   static constexpr int kRegisters = 300;
   static constexpr std::uint8_t kOwnException = 0x21;
+  static constexpr std::chrono::milliseconds kSlow{60};
   enum class Mode : int {
     normal,
     stalls,          ///< takes requests, and does not answer
@@ -57,6 +59,8 @@ class ModbusPeer {
     other_protocol,  ///< says in the header that it is no Modbus
     other_write,     ///< confirms writes of another address
     own_exception,   ///< answers with an exception that no standard names
+    slow,            ///< normal, kSlow behind each request
+    late,            ///< answers each request with the response to the one before
     ends,            ///< normal, and ends the connection behind each response
     echoes,          ///< normal, and its input registers follow its holding registers
   };
@@ -94,6 +98,8 @@ class ModbusPeer {
   std::atomic<int> requests_{0};
   std::atomic<bool> ends_{false};
   UniqueFd listener_;
+  Request held_{};  ///< late: the request before
+  int held_size_ = 0;
   int line_ = -1;
   int unit_ = 0;
   std::thread thread_;

@@ -229,6 +229,21 @@ TEST(ModbusProcess, AnImageWhoseFileIsCutShortIsOpenedAnew) {
   EXPECT_TRUE(first_word_becomes(plant, "t.in", 6)) << sut.log();
 }
 
+// An instance whose settings have another Size, once the file was removed.
+TEST(ModbusProcess, AnImageThatComesWithAnotherSizeIsTold) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram sut(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 42)) << sut.log();
+  ASSERT_EQ(::unlink(fmt::format("/dev/shm/{}.memory.t.out", plant.pool()).c_str()), 0);
+  plc_image other{};
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "t.out", Plant::kSize + 64, PLC_IMAGE_WRITE, &other), 0);
+  EXPECT_TRUE(eventually([&] { return sut.logged("an image of another size"); })) << sut.log();
+  EXPECT_TRUE(eventually([&] { return peer.holding(7) == 0; })) << "the one before is silent";
+  plc_image_close(&other);
+}
+
 TEST(ModbusProcess, ABadConfigurationIsRefusedWithItsLine) {
   Plant plant;
   const std::string file = plant.write("[[device]]\nname = \"d\"\ntcp = \"somewhere\"\n");

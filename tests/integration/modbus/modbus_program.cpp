@@ -81,13 +81,24 @@ void Plant::put_out(unsigned offset, std::uint16_t word) {
 
 void Plant::die_and_keep() {
   plc_image_hold(&outputs_, 1);
+  outputs_.header->on_end = 0;
   plc_image_tell(&outputs_, PLC_IMAGE_STATE_ENDED, 0);
+}
+
+void Plant::keep(unsigned state) {
+  std::array<std::uint8_t, kSize> bytes{};
+  (void)plc_image_read_latest(&outputs_, bytes.data(), nullptr);
+  plc_image_hold(&outputs_, 1);
+  outputs_.header->on_end = 0;
+  plc_image_set_safe(&outputs_, bytes.data());
+  plc_image_tell(&outputs_, state, 1);
 }
 
 void Plant::show_safe(unsigned state, std::uint16_t word, bool holds) {
   std::array<std::uint8_t, kSize> bytes{};
   std::memcpy(bytes.data(), &word, sizeof word);
   plc_image_hold(&outputs_, holds ? 1 : 0);
+  outputs_.header->on_end = holds ? 1 : 0;
   plc_image_set_safe(&outputs_, bytes.data());
   plc_image_tell(&outputs_, state, 1);
 }

@@ -41,8 +41,12 @@ class Plant {
   /// Tells this state of the PLC (PLC_IMAGE_STATE_...), and shows a safe image with this word at byte 0.
   /// `holds`: its settings name a safe state.
   void show_safe(unsigned state, std::uint16_t word, bool holds = true);
+  /// Tells this state of a PLC whose settings keep its outputs.
+  void keep(unsigned state);
   /// The death of a PLC whose settings keep its outputs, as the manager tells it.
   void die_and_keep();
+  /// A task of the next process has put outputs out.
+  void run() { plc_image_resume(&outputs_, plc_image_control(&outputs_)); }
   /// A sign of the PLC.
   void beat() { plc_image_beat(&outputs_); }
 

@@ -90,6 +90,16 @@ TEST(ModbusPdu, EachExceptionIsTold) {
   }
 }
 
+TEST(ModbusPdu, AShapeIsThatOfAGoodResponse) {
+  EXPECT_EQ(read_shape(map_of(RegisterKind::input_register, 7, 2)),
+            (ResponseShape{.function = 4, .size = 6}));
+  EXPECT_EQ(read_shape(map_of(RegisterKind::coil, 7, 9)), (ResponseShape{.function = 1, .size = 4}));
+  EXPECT_EQ(read_shape(map_of(RegisterKind::coil, 7, 8)), (ResponseShape{.function = 1, .size = 3}));
+  EXPECT_EQ(write_shape(map_of(RegisterKind::coil, 7, 1)), (ResponseShape{.function = 5, .size = 5}));
+  EXPECT_EQ(write_shape(map_of(RegisterKind::holding_register, 7, 2)),
+            (ResponseShape{.function = 16, .size = 5}));
+}
+
 TEST(ModbusPdu, AWriteIsConfirmedWithItsAddressAndItsCountOrValue) {
   MapValues values;
   const Pdu single = write_request(map_of(RegisterKind::coil, 7, 1), values);

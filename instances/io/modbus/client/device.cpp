@@ -18,6 +18,19 @@ constexpr std::chrono::milliseconds kSafeStateTimeout{300};
 // For the connection, and again for the response, of one that did not answer last.
 constexpr std::chrono::milliseconds kLastAttempt{100};
 
+// A read that the device has, or less of one, whose response has another shape.
+std::optional<RegisterMap> other_read(const std::vector<RegisterMap>& reads, const ResponseShape& shape) {
+  constexpr std::uint32_t kOneByte = 8;
+  for (const RegisterMap& map : reads) {
+    if (read_shape(map) != shape) return map;
+  }
+  for (RegisterMap less : reads) {
+    less.count = is_bit(less.kind) ? std::min(less.count, kOneByte) : std::max(less.count - 1, 1U);
+    if (read_shape(less) != shape) return less;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images, const StopEvent& stop)
@@ -30,6 +43,8 @@ Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images,
   for (const RegisterMap& map : config.writes) {
     outputs_.push_back({.map = &map, .image = images.output(map.image), .written = {}, .written_at = {}});
   }
+  // Of a process before.
+  if (!config.serial.empty() && !config.reads.empty()) unanswered_ = read_shape(config.reads.front());
 }
 
 void Device::run() {
@@ -47,6 +62,7 @@ void Device::run() {
     spdlog::info("device '{}': {} polls were skipped because the one before took too long", config_.name,
                  schedule.skipped());
   }
+  has_ended_ = true;
 }
 
 bool Device::poll() {
@@ -54,8 +70,9 @@ bool Device::poll() {
   const LinkResult written = write_outputs();
   if (!asked_) return false;  // nothing was due, so nothing is known
   const bool is_there = written || written.error().exception != 0;
+  const TimePoint asked_at = MonotonicClock::now();  // a device may answer with older values, not with newer
   const LinkResult read = is_there ? read_inputs() : written;
-  end_poll(written, read);
+  end_poll(written, read, asked_at);
   return true;
 }
 
@@ -81,6 +98,7 @@ LinkResult Device::write_output(Output& output) {
   if (!wanted || !due) return {};
   asked_ = true;
   auto result = link_.write(config_, *output.map, values);
+  note(write_shape(*output.map), result);
   output.is_written = result.has_value();
   output.connection = link_.connection();
   output.written = values;
@@ -92,10 +110,9 @@ LinkResult Device::write_output(Output& output) {
 bool Device::outputs_of(Output& output, MapValues& values) {
   bool silent = false;
   output.image->look([&](std::span<const std::byte> bytes, const OutputImage::Shown& shown) {
-    // A writer that ends in its silence says nothing with that: the outputs are not switched on again.
-    const bool has_ended = shown.ended && output.is_silent && output.silent_with == shown.word;
-    silent = has_ended || shown.silence >= config_.silent_after;
-    if (silent) output.silent_with = shown.word;
+    // Outputs that are only kept are not switched on again: a fault, a new process or the end says no values.
+    silent = shown.silence >= config_.silent_after || (output.fell_silent && shown.kept);
+    output.fell_silent = silent && (output.fell_silent || shown.silence != Duration::max());
     if (!silent) values.read_from(*output.map, bytes);
   });
   tell_silence(output, silent);
@@ -116,9 +133,37 @@ void Device::tell_silence(Output& output, bool silent) const {
 
 LinkResult Device::read_inputs() {
   for (Input& input : inputs_) {
-    if (auto read = link_.read(config_, *input.map, input.values); !read) return read;
+    if (auto apart = tell_apart(*input.map); !apart) return apart;
+    auto read = link_.read(config_, *input.map, input.values);
+    note(read_shape(*input.map), read);
+    if (!read) return read;
   }
   return {};
+}
+
+// Nothing at a serial line says which request a response belongs to. A device that answers one request too
+// late would do so forever, with the values of other registers. So after a failure it is asked for something
+// that cannot be mistaken for the response which may still come.
+LinkResult Device::tell_apart(const RegisterMap& map) {
+  if (!unanswered_ || *unanswered_ != read_shape(map)) return {};
+  const auto other = other_read(config_.reads, *unanswered_);
+  if (!other) return {};
+  MapValues ignored;
+  auto read = link_.read(config_, *other, ignored);
+  note(read_shape(*other), read);
+  if (!read && read.error().exception == 0) return read;
+  return {};
+}
+
+void Device::note(ResponseShape shape, const LinkResult& result) {
+  if (config_.serial.empty()) return;
+  const bool is_lost = !result && result.error().exception == 0;
+  // All exceptions of a function are alike: one says nothing about which request it refuses.
+  if (is_lost || (!result && unanswered_)) {
+    unanswered_ = shape;
+  } else if (result && unanswered_ && *unanswered_ != shape) {
+    unanswered_.reset();
+  }
 }
 
 void Device::publish_inputs() {
@@ -131,8 +176,9 @@ void Device::publish_inputs() {
   }
 }
 
-void Device::end_poll(const LinkResult& written, const LinkResult& read) {
+void Device::end_poll(const LinkResult& written, const LinkResult& read, TimePoint asked_at) {
   const LinkFailure* const failure = !read ? &read.error() : !written ? &written.error() : nullptr;
+  if (failure != nullptr && failure->not_asked) return;
   const std::uint8_t exception = failure == nullptr ? std::uint8_t{0} : failure->exception;
   quality_ = failure == nullptr ? Quality::good : exception != 0 ? Quality::exception : Quality::lost;
   if (quality_ == Quality::lost) {
@@ -140,7 +186,7 @@ void Device::end_poll(const LinkResult& written, const LinkResult& read) {
   }
   const TimePoint now = MonotonicClock::now();
   if (read) {
-    state_.read(now);  // first: inputs that are too old become zero
+    state_.read(asked_at);  // first: inputs that are too old become zero
     publish_inputs();
   }
   state_.polled(quality_, exception);  // behind the inputs: none is shown as good that has not come

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,6 +11,7 @@
 
 #include "instances/io/modbus/client/device_state.hpp"
 #include "instances/io/modbus/client/link.hpp"
+#include "instances/io/modbus/client/pdu.hpp"
 #include "instances/io/modbus/config/map_values.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 #include "instances/io/modbus/images/image_table.hpp"
@@ -30,6 +33,8 @@ class Device {
   void run();
   /// One poll; run() does it. False: there was nothing to ask. The thread of run() only, or no thread runs.
   bool poll();
+  /// run() is over.
+  [[nodiscard]] bool has_ended() const noexcept { return has_ended_; }
   /// Of the last poll.
   [[nodiscard]] Quality quality() const noexcept { return quality_; }
 
@@ -52,8 +57,8 @@ class Device {
     bool is_written = false;
     std::uint64_t connection = 0;  ///< on which it was written
     TimePoint written_at;
-    bool is_silent = true;          ///< its PLC; at first nothing was put out
-    std::uint64_t silent_with = 0;  ///< the image that was shown then
+    bool is_silent = true;     ///< its PLC; at first nothing was put out
+    bool fell_silent = false;  ///< after it had put something out
   };
 
   [[nodiscard]] LinkResult write_outputs();
@@ -61,9 +66,11 @@ class Device {
   [[nodiscard]] bool outputs_of(Output& output, MapValues& values);
   void tell_silence(Output& output, bool silent) const;
   [[nodiscard]] LinkResult read_inputs();
+  [[nodiscard]] LinkResult tell_apart(const RegisterMap& map);
+  void note(ResponseShape shape, const LinkResult& result);
   void publish_inputs();
   void make_safe();
-  void end_poll(const LinkResult& written, const LinkResult& read);
+  void end_poll(const LinkResult& written, const LinkResult& read, TimePoint asked_at);
   void report(const LinkFailure* failure);
 
   const DeviceConfig& config_;
@@ -74,6 +81,9 @@ class Device {
   std::vector<InputImage*> input_images_;  ///< of inputs_, each once
   std::vector<Output> outputs_;
   DeviceState state_;
+  /// At a serial line: the device may still answer a request with that shape, which was given up.
+  std::optional<ResponseShape> unanswered_;
+  std::atomic<bool> has_ended_{false};
   bool asked_ = false;               ///< the poll has something to ask
   Quality quality_ = Quality::none;  ///< of the last poll
   Quality told_ = Quality::none;     ///< in the log

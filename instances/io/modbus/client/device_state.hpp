@@ -13,10 +13,10 @@ namespace plchost::modbus {
 /// How a device answers, as its thread tells it and others show it. Any thread.
 class DeviceState {
  public:
-  /// All inputs were read.
-  void read(TimePoint now) {
+  /// All inputs were read, the first of which was asked for at that time.
+  void read(TimePoint asked_at) {
     const std::lock_guard lock(mutex_);
-    read_at_ = now;
+    read_at_ = asked_at;
   }
   /// The end of a poll. `exception`: of a refused request; 0: none.
   void polled(Quality quality, std::uint8_t exception) {

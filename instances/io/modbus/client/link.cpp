@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/file.h>
 #include <sys/select.h>
 #include <sys/socket.h>
@@ -22,6 +23,8 @@ namespace {
 using Failure = std::unexpected<std::string>;
 
 constexpr int kDataBits = 8;  // of RTU
+// A device that answers does so within that time. At the end one that does not must not keep the line.
+constexpr std::chrono::milliseconds kGraceAtEnd{300};
 constexpr std::array kParityLetters = {'N', 'E', 'O'};
 
 }  // namespace
@@ -102,22 +105,39 @@ std::expected<void, std::string> Link::open_line(const DeviceConfig& device) {
                        : fmt::format("{}: another process uses this line", device.serial));
 }
 
+// libmodbus waits for a whole response, and nothing interrupts it. So it does from the first byte on only.
+bool Link::await_line(TimePoint deadline, Limits limits) {
+  const int fd = modbus_get_socket(line_.get());
+  const StopEvent* const stop = limits.at_end ? nullptr : &stop_;
+  if (!wait_for(fd, POLLIN, deadline, stop)) {
+    if (stop != nullptr && stop->is_set()) deadline = std::min(deadline, MonotonicClock::now() + kGraceAtEnd);
+    if (!wait_for(fd, POLLIN, deadline, nullptr)) {
+      errno = ETIMEDOUT;
+      return false;
+    }
+  }
+  constexpr std::chrono::microseconds kLeast{1000};
+  constexpr std::int64_t kSecond = 1'000'000;
+  const auto left = std::chrono::duration_cast<std::chrono::microseconds>(deadline - MonotonicClock::now());
+  const auto us = std::max(left, kLeast).count();
+  modbus_set_response_timeout(line_.get(), static_cast<std::uint32_t>(us / kSecond),
+                              static_cast<std::uint32_t>(us % kSecond));
+  return true;
+}
+
 std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
-  if (stop_.is_set() && !limits.at_end && !line_is_open_) return Failure("this process ends");
   if (auto opened = open_line(device); !opened) return Failure(std::move(opened).error());
   modbus_t* const line = line_.get();
   modbus_set_slave(line, device.unit);
-  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(limits.timeout).count();
-  constexpr std::int64_t kSecond = 1'000'000;
-  modbus_set_response_timeout(line, static_cast<std::uint32_t>(us / kSecond),
-                              static_cast<std::uint32_t>(us % kSecond));
   modbus_flush(line);  // a late response of somebody else
   std::array<std::uint8_t, kMaxPdu + 1> raw{};
   raw[0] = device.unit;
   std::ranges::copy(asked.view(), raw.begin() + 1);
   std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> received{};
   const bool sent = modbus_send_raw_request(line, raw.data(), static_cast<int>(asked.size) + 1) > 0;
-  const int size = sent ? modbus_receive_confirmation(line, received.data()) : -1;
+  const TimePoint deadline = MonotonicClock::now() + limits.timeout;
+  const int size =
+      sent && await_line(deadline, limits) ? modbus_receive_confirmation(line, received.data()) : -1;
   if (size < 0) {
     // The line stays open for its other devices while they can use it.
     const int error = errno;
@@ -135,6 +155,8 @@ std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limit
 
 LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take) {
   const std::lock_guard lock(turn_);
+  if (stop_.is_set() && !limits.at_end)
+    return std::unexpected(LinkFailure{.text = "this process ends", .not_asked = true});
   const auto response = line_ ? ask_line(device, limits, asked) : ask_tcp(device, limits, asked);
   auto result = response ? take(response->view())
                          : std::unexpected(LinkFailure{.exception = 0, .text = response.error()});

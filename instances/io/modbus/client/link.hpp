@@ -59,6 +59,7 @@ class Link {
   LinkResult request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take);
   LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
   std::expected<Pdu, std::string> ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked);
+  bool await_line(TimePoint deadline, Limits limits);
   std::expected<Pdu, std::string> ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked);
   std::expected<void, std::string> open_tcp(const DeviceConfig& device, Limits limits);
   std::expected<void, std::string> open_line(const DeviceConfig& device);

@@ -47,6 +47,16 @@ std::size_t size_of_values(const RegisterMap& map) noexcept {
   return is_bit(map.kind) ? (map.count + 7) / 8 : std::size_t{map.count} * 2;
 }
 
+std::uint8_t read_function(const RegisterMap& map) noexcept {
+  return static_cast<std::uint8_t>(kReadFunctions.at(std::to_underlying(map.kind)));
+}
+
+std::uint8_t write_function(const RegisterMap& map) noexcept {
+  const bool single = map.count == 1;
+  if (is_bit(map.kind)) return single ? MODBUS_FC_WRITE_SINGLE_COIL : MODBUS_FC_WRITE_MULTIPLE_COILS;
+  return single ? MODBUS_FC_WRITE_SINGLE_REGISTER : MODBUS_FC_WRITE_MULTIPLE_REGISTERS;
+}
+
 LinkResult no_answer(std::string text) {
   return std::unexpected(LinkFailure{.exception = 0, .text = std::move(text)});
 }
@@ -67,9 +77,17 @@ LinkResult check_function(std::uint8_t function, std::span<const std::uint8_t> r
 
 }  // namespace
 
+ResponseShape read_shape(const RegisterMap& map) noexcept {
+  return {.function = read_function(map), .size = kValuesAt + size_of_values(map)};
+}
+
+ResponseShape write_shape(const RegisterMap& map) noexcept {
+  return {.function = write_function(map), .size = kConfirmedSize};
+}
+
 Pdu read_request(const RegisterMap& map) noexcept {
   Pdu pdu;
-  add_byte(pdu, static_cast<unsigned>(kReadFunctions.at(std::to_underlying(map.kind))));
+  add_byte(pdu, read_function(map));
   add_word(pdu, map.address);
   add_word(pdu, map.count);
   return pdu;
@@ -80,8 +98,7 @@ Pdu write_request(const RegisterMap& map, MapValues& values) noexcept {
   const bool single = map.count == 1;
   const bool bits = is_bit(map.kind);
   Pdu pdu;
-  add_byte(pdu, bits ? (single ? MODBUS_FC_WRITE_SINGLE_COIL : MODBUS_FC_WRITE_MULTIPLE_COILS)
-                     : (single ? MODBUS_FC_WRITE_SINGLE_REGISTER : MODBUS_FC_WRITE_MULTIPLE_REGISTERS));
+  add_byte(pdu, write_function(map));
   add_word(pdu, map.address);
   if (single) {
     add_word(pdu, bits ? (values.bits(1)[0] != 0 ? kOn : 0) : values.registers(1)[0]);
@@ -105,8 +122,7 @@ Pdu write_request(const RegisterMap& map, MapValues& values) noexcept {
 }
 
 LinkResult take_values(const RegisterMap& map, std::span<const std::uint8_t> response, MapValues& values) {
-  const auto function = static_cast<std::uint8_t>(kReadFunctions.at(std::to_underlying(map.kind)));
-  if (auto good = check_function(function, response); !good) return good;
+  if (auto good = check_function(read_function(map), response); !good) return good;
   const std::size_t size = size_of_values(map);
   if (response.size() != kValuesAt + size || response[1] != size) {
     return no_answer(fmt::format("the response has {} bytes, and {} values have {}", response.size(),

@@ -18,6 +18,7 @@ namespace plchost::modbus {
 struct LinkFailure {
   std::uint8_t exception = 0;  ///< the code of the device; 0: no answer, or garbage
   std::string text;
+  bool not_asked = false;  ///< this process ends: nothing was sent, nothing is known of the device
 };
 using LinkResult = std::expected<void, LinkFailure>;
 
@@ -28,6 +29,16 @@ struct Pdu {
   std::size_t size = 0;
   [[nodiscard]] std::span<const std::uint8_t> view() const noexcept { return std::span(bytes).first(size); }
 };
+
+/// The kind of response to a request that is not refused. Two of different shapes are never mistaken for each
+/// other.
+struct ResponseShape {
+  std::uint8_t function = 0;
+  std::size_t size = 0;
+  [[nodiscard]] bool operator==(const ResponseShape&) const = default;
+};
+[[nodiscard]] ResponseShape read_shape(const RegisterMap& map) noexcept;
+[[nodiscard]] ResponseShape write_shape(const RegisterMap& map) noexcept;
 
 /// Asks for all of the map, which is a [[device.read]].
 [[nodiscard]] Pdu read_request(const RegisterMap& map) noexcept;

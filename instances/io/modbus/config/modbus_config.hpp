@@ -123,7 +123,7 @@ struct DeviceStatus {
   std::uint16_t quality = 0;   ///< Quality
   std::uint8_t exception = 0;  ///< the last exception code of the device; 0: none
   std::uint8_t counter = 0;    ///< another one every 50 ms, as long as plchost-modbus runs
-  std::uint32_t age_ms = 0;    ///< since the inputs were last read whole; kNeverRead: not yet
+  std::uint32_t age_ms = 0;    ///< since the last reading of all inputs began; kNeverRead: not yet
 };
 static_assert(sizeof(DeviceStatus) == 8);
 inline constexpr std::uint32_t kNeverRead = 0xffff'ffff;

@@ -3,6 +3,8 @@
 #include <chrono>
 #include <utility>
 
+#include "shm/log/log.hpp"
+
 namespace plchost::modbus {
 
 namespace {
@@ -25,12 +27,10 @@ void OutputImage::refresh() {
 
 OutputImage::Shown OutputImage::shown() const noexcept {
   const plc_image& image = image_.image();
-  const bool safe = (plc_image_control(&image) & PLC_IMAGE_SHOWS_SAFE) != 0;
-  const std::uint64_t number =
-      __atomic_load_n(safe ? &image.header->safe : &image.header->latest, __ATOMIC_ACQUIRE);
+  const unsigned state = plc_image_state(&image);
+  const bool rests = state >= PLC_IMAGE_STATE_STOPPED && state <= PLC_IMAGE_STATE_ENDED;
   return {.silence = Duration(plc_image_silence_ns(&image)),
-          .ended = plc_image_state(&image) == PLC_IMAGE_STATE_ENDED,
-          .word = number << 1U | static_cast<std::uint64_t>(safe)};
+          .kept = rests && __atomic_load_n(&image.header->on_end, __ATOMIC_RELAXED) == 0};
 }
 
 void OutputImage::repair() {
@@ -42,7 +42,10 @@ void OutputImage::repair() {
   // has said something.
   if (!image_.lost() && !ProcessImage::exists(pool_, name_)) return;
   auto opened = ProcessImage::open(pool_, name_, static_cast<std::uint32_t>(bytes_.size()), PLC_IMAGE_READ);
-  if (!opened) return;  // the age tells it
+  if (!opened) {
+    if (repair_pause_.is_over(now)) spdlog::error("{}", opened.error().describe());
+    return;
+  }
   if (image_.lost() || opened->is_written()) image_ = std::move(*opened);
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "instances/io/modbus/images/process_image.hpp"
+#include "instances/io/modbus/threads/log_pause.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -28,8 +29,8 @@ class OutputImage {
     /// has stopped or ended is not: it says, or the manager for it, which outputs hold from then on.
     /// Duration::max(): nothing was written yet.
     Duration silence{};
-    bool ended = false;      ///< the writer's process
-    std::uint64_t word = 0;  ///< another one for each image that is shown; 0: none
+    /// No task drives the outputs, and they only stay what they were: the settings of the PLC say no values.
+    bool kept = false;
   };
   /// Calls `look` with the bytes that are shown, and a Shown.
   template <class Look>
@@ -57,6 +58,7 @@ class OutputImage {
   std::vector<std::byte> bytes_;
   std::vector<std::byte> fresh_;
   TimePoint looked_at_;  ///< whether the file is still there
+  LogPause repair_pause_;
 };
 
 }  // namespace plchost::modbus
