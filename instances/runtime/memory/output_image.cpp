@@ -26,13 +26,24 @@ void OutputImage::begin(std::span<const std::byte> initial, std::span<const std:
   } else if (plc_image_read(&image_, scratch_.data(), nullptr) == PLC_IMAGE_OK) {
     shown_ = scratch_;
   }
+  // A terminal that goes by the age must not take the values of the process before for fresh ones.
+  plc_image_i64 stamp_ns = 0;
+  if (holds) {
+    stamp_ns = plc_image_now_ns();
+  } else if (plc_image_read_latest(&image_, scratch_.data(), &stamp_ns) != PLC_IMAGE_OK) {
+    stamp_ns = 0;
+  }
   plc_image_take(&image_, static_cast<plc_image_u64>(::getpid()));
   plc_image_hold(&image_, holds ? 1 : 0);
   plc_image_set_safe(&image_, shown_.data());
   plc_image_tell(&image_, PLC_IMAGE_STATE_STOPPED, 1);
   __atomic_store_n(&image_.header->on_end, keeps() ? 0U : 1U, __ATOMIC_RELAXED);
   plc_image_beat(&image_);
-  write(initial);
+  const std::uint64_t latest = load();
+  const unsigned slot = static_cast<unsigned>((latest & 0xffU) + 1) % PLC_IMAGE_SLOTS;
+  const std::uint64_t sequence = plc_image_next_sequence(latest);
+  plc_image_fill(&image_, slot, sequence, initial.data(), stamp_ns);
+  __atomic_store_n(&image_.header->latest, sequence << 8U | slot, __ATOMIC_RELEASE);
 }
 
 void OutputImage::put_safe(unsigned state) noexcept {

@@ -31,7 +31,8 @@ class OutputImage {
 
   /// Takes the image over from the process before, whatever that has left. Readers are shown the safe image:
   /// `safe`, or if that is empty, what they were shown before, and `initial` if that was nothing. `holds`: as
-  /// of plc_image_hold(). Publishes `initial`. Set-up, once.
+  /// of plc_image_hold(); if false, the age of the last image that a task has published goes on. Publishes
+  /// `initial`. Set-up, once.
   void begin(std::span<const std::byte> initial, std::span<const std::byte> safe, bool holds);
   /// From now on readers are shown the safe image, or the last one that was published if they are to keep
   /// that. Later publications are not shown. Control thread.

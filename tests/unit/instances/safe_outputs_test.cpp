@@ -166,6 +166,31 @@ TEST_F(SafeOutputsOfAreas, AreToldByTheirAgeIfTheSettingsNameNone) {
   }
 }
 
+// A terminal that has cleared its outputs would switch them on again, though no task has run.
+TEST_F(SafeOutputsOfAreas, AreNoFresherByTheNextProcessIfTheSettingsNameNone) {
+  set_up("");
+  EXPECT_EQ(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER) << "no task has put anything out yet";
+  sut.outputs().arm();
+  run(0, 10);
+  sut.outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
+  Words read{};
+  plc_image_i64 before_ns = 0;
+  ASSERT_EQ(plc_image_read_latest(&*terminal, read.data(), &before_ns), PLC_IMAGE_OK);
+  OutputImage next(std::span(reinterpret_cast<std::byte*>(terminal->header), terminal->mapped), 12);
+  const Words initial{7, 7, 7};
+  next.begin(std::as_bytes(std::span(initial)), {}, false);
+  EXPECT_EQ(shown(), (Words{10, 5, 12}));
+  plc_image_i64 stamp_ns = 0;
+  ASSERT_EQ(plc_image_read_latest(&*terminal, read.data(), &stamp_ns), PLC_IMAGE_OK);
+  EXPECT_EQ(read, initial);
+  EXPECT_EQ(stamp_ns, before_ns) << "the age goes on";
+  next.arm();
+  next.write(std::as_bytes(std::span(initial)));
+  next.published();
+  EXPECT_EQ(shown(), initial);
+  EXPECT_LT(plc_image_silence_ns(&*terminal), PLC_IMAGE_NEVER);
+}
+
 // A terminal would go on with the last image that it could read.
 TEST_F(SafeOutputsOfAreas, ThatAStrangerHasSpoiledAreSilence) {
   set_up("Zero");
