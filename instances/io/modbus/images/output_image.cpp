@@ -10,6 +10,7 @@ namespace plchost::modbus {
 namespace {
 
 constexpr std::chrono::milliseconds kLookPause{500};
+constexpr std::chrono::seconds kTellPause{1};
 
 }  // namespace
 
@@ -43,7 +44,9 @@ void OutputImage::repair() {
   if (!image_.lost() && !ProcessImage::exists(pool_, name_)) return;
   auto opened = ProcessImage::open(pool_, name_, static_cast<std::uint32_t>(bytes_.size()), PLC_IMAGE_READ);
   if (!opened) {
-    if (repair_pause_.is_over(now)) spdlog::error("{}", opened.error().describe());
+    if (now < tell_again_) return;
+    tell_again_ = now + kTellPause;
+    spdlog::error("{}", opened.error().describe());
     return;
   }
   if (image_.lost() || opened->is_written()) image_ = std::move(*opened);

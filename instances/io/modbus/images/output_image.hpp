@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "instances/io/modbus/images/process_image.hpp"
-#include "instances/io/modbus/threads/log_pause.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -57,8 +56,8 @@ class OutputImage {
   ProcessImage image_;
   std::vector<std::byte> bytes_;
   std::vector<std::byte> fresh_;
-  TimePoint looked_at_;  ///< whether the file is still there
-  LogPause repair_pause_;
+  TimePoint looked_at_;   ///< whether the file is still there
+  TimePoint tell_again_;  ///< that it cannot be opened
 };
 
 }  // namespace plchost::modbus
