@@ -2,13 +2,16 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <poll.h>
+#include <unistd.h>
 
 #include "tests/integration/modbus/device_of_a_test.hpp"
 #include "tests/integration/modbus/modbus_peer.hpp"
@@ -127,6 +130,39 @@ TEST(ModbusLine, TheEndReachesAllOutputsOfALine) {
   EXPECT_EQ(sut.end(SIGTERM), 0);
   EXPECT_TRUE(eventually([&] { return peer.holding(200 + kMaps - 1) == 0; })) << sut.log();
   EXPECT_FALSE(sut.logged("a device keeps its thread"));
+}
+
+// The bytes up to a pause: a request.
+std::vector<std::uint8_t> next_request(const SerialLine& line) {
+  std::vector<std::uint8_t> request;
+  pollfd look{.fd = line.other_end(), .events = POLLIN, .revents = 0};
+  while (::poll(&look, 1, request.empty() ? 40'000 : 20) > 0) {
+    std::uint8_t byte = 0;
+    if (::read(line.other_end(), &byte, 1) == 1) request.push_back(byte);
+  }
+  return request;
+}
+
+// While a silent device has the line.
+TEST(ModbusLine, OutputsDoNotGrowOldWhileADeviceWaitsForItsTurn) {
+  Plant plant;
+  const SerialLine line;
+  std::string text = serial_device(line, 1, 0);
+  text.replace(text.find("timeout_ms = 200"), 16, "timeout_ms = 200\nsilent_after_ms = 600000");
+  std::string silent = serial_device(line, 2, 8);
+  silent.replace(silent.find("timeout_ms = 200"), 16, "timeout_ms = 3000");
+  plant.put_out(0, 0x0815);
+  const ModbusProgram sut(plant, plant.write(text + silent));
+  std::vector<std::uint8_t> request;
+  while ((request = next_request(line)).size() > 1 && request[0] != 2) {
+  }
+  ASSERT_GT(request.size(), 1U) << sut.log();
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // the other one wants to write meanwhile
+  plant.put_out(0, 0x0042);
+  while ((request = next_request(line)).size() > 1 && request[0] != 1) {
+  }
+  ASSERT_GT(request.size(), 8U) << sut.log();
+  EXPECT_EQ(request[7] << 8U | request[8], 0x0042);
 }
 
 // RTU has no number of a request: only the kind of a response tells which one it belongs to.

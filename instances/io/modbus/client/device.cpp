@@ -70,8 +70,8 @@ bool Device::poll() {
   const LinkResult written = write_outputs();
   if (!asked_) return false;  // nothing was due, so nothing is known
   const bool is_there = written || written.error().exception != 0;
-  const TimePoint asked_at = MonotonicClock::now();  // a device may answer with older values, not with newer
-  const LinkResult read = is_there ? read_inputs() : written;
+  TimePoint asked_at = MonotonicClock::now();
+  const LinkResult read = is_there ? read_inputs(asked_at) : written;
   end_poll(written, read, asked_at);
   return true;
 }
@@ -88,21 +88,27 @@ LinkResult Device::write_outputs() {
   return result;
 }
 
+bool Device::is_due(Output& output, MapValues& values) {
+  if (!outputs_of(output, values)) return false;
+  const Duration age = MonotonicClock::now() - output.written_at;
+  return !output.is_written || output.connection != link_.connection() || values != output.written ||
+         (output.map->rewrite > Duration::zero() && age >= output.map->rewrite);
+}
+
 LinkResult Device::write_output(Output& output) {
   MapValues values;
-  const bool wanted = outputs_of(output, values);
-  const TimePoint now = MonotonicClock::now();
-  const bool due = !output.is_written || output.connection != link_.connection() ||
-                   values != output.written ||
-                   (output.map->rewrite > Duration::zero() && now - output.written_at >= output.map->rewrite);
-  if (!wanted || !due) return {};
+  if (!is_due(output, values)) return {};
+  // While the others of a serial line have their turns, the PLC may have stopped.
+  const Link::Turn turn = link_.take_turn();
+  values = MapValues();
+  if (!is_due(output, values)) return {};
   asked_ = true;
   auto result = link_.write(config_, *output.map, values);
   note(write_shape(*output.map), result);
   output.is_written = result.has_value();
   output.connection = link_.connection();
   output.written = values;
-  output.written_at = now;
+  output.written_at = MonotonicClock::now();
   return result;
 }
 
@@ -131,8 +137,11 @@ void Device::tell_silence(Output& output, bool silent) const {
   }
 }
 
-LinkResult Device::read_inputs() {
+// A device may answer with values that it had when it was asked, not before.
+LinkResult Device::read_inputs(TimePoint& asked_at) {
   for (Input& input : inputs_) {
+    const Link::Turn turn = link_.take_turn();
+    if (&input == &inputs_.front()) asked_at = MonotonicClock::now();
     if (auto apart = tell_apart(*input.map); !apart) return apart;
     auto read = link_.read(config_, *input.map, input.values);
     note(read_shape(*input.map), read);

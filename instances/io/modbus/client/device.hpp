@@ -63,9 +63,10 @@ class Device {
 
   [[nodiscard]] LinkResult write_outputs();
   [[nodiscard]] LinkResult write_output(Output& output);
+  [[nodiscard]] bool is_due(Output& output, MapValues& values);
   [[nodiscard]] bool outputs_of(Output& output, MapValues& values);
   void tell_silence(Output& output, bool silent) const;
-  [[nodiscard]] LinkResult read_inputs();
+  [[nodiscard]] LinkResult read_inputs(TimePoint& asked_at);
   [[nodiscard]] LinkResult tell_apart(const RegisterMap& map);
   void note(ResponseShape shape, const LinkResult& result);
   void publish_inputs();

@@ -154,7 +154,7 @@ std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limit
 }
 
 LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take) {
-  const std::lock_guard lock(turn_);
+  const Turn turn = take_turn();
   if (stop_.is_set() && !limits.at_end)
     return std::unexpected(LinkFailure{.text = "this process ends", .not_asked = true});
   const auto response = line_ ? ask_line(device, limits, asked) : ask_tcp(device, limits, asked);

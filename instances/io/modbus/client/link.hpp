@@ -31,6 +31,11 @@ class Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
+  /// The line is this thread's alone, until the end of what is returned: for several requests, or for values
+  /// that must not grow old while others have their turn.
+  using Turn = std::unique_lock<std::recursive_mutex>;
+  [[nodiscard]] Turn take_turn() { return Turn(turn_); }
+
   /// The time limit is that of the device, for the connection and for the whole response.
   [[nodiscard]] LinkResult read(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
   [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
@@ -68,7 +73,7 @@ class Link {
 
   std::unique_ptr<modbus_t, Free> line_;  ///< null: TCP
   const StopEvent& stop_;
-  std::mutex turn_;  ///< held for one request, and for what follows
+  std::recursive_mutex turn_;  ///< held for one request, and for what follows
   bool line_is_open_ = false;
   std::uint16_t number_ = 0;  ///< of the last request on TCP
   std::atomic<std::uint64_t> connection_{0};
