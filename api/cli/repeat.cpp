@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "api/cli/interrupt.hpp"
+#include "api/cli/output.hpp"
 
 namespace plchost {
 
@@ -22,7 +23,7 @@ int repeat(const Repetition& repetition, const Action& action) {
     if (!repetition.for_programs && terminal) fmt::print("\x1b[H\x1b[2J");
     if (!repetition.for_programs && !terminal && i > 0) fmt::print("\n");
     code = action();
-    std::fflush(stdout);
+    flush_output();
     if (code != 0 && !terminal) break;
     next = std::max(next + every, MonotonicClock::now());
   }

@@ -9,6 +9,7 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/interrupt.hpp"
+#include "api/cli/output.hpp"
 #include "api/cli/rows/log_rows.hpp"
 #include "shm/base/names.hpp"
 
@@ -116,7 +117,7 @@ void print_news(const CliSession& session, const LogArguments& arguments, const 
       fmt::print("{}", format_log_line(line));
     }
   }
-  std::fflush(stdout);
+  flush_output();
 }
 
 int follow(const CliSession& session, LogFollower& log, const LogArguments& arguments) {

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/interrupt.hpp"
+#include "api/cli/output.hpp"
 #include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/dds/page_sample.hpp"
@@ -157,7 +158,7 @@ void print_look(const CliSession& session, const std::string& name, const Object
   } else {
     fmt::print("{}  {}  {}\n", time_text(now), printable(name), printable(look.text));
   }
-  std::fflush(stdout);
+  flush_output();
 }
 
 int watch_object(CliSession& session, const WatchObjectArguments& arguments) {

@@ -7,6 +7,7 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/interrupt.hpp"
+#include "api/cli/output.hpp"
 #include "api/cli/rows/status_rows.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
@@ -108,7 +109,7 @@ int watch_transitions(CliSession& session, const TransitionArguments& arguments)
     for (const TransitionView& view : *news) {
       if (!(*is_wanted)(view.sample)) continue;
       print(session, view);
-      std::fflush(stdout);
+      flush_output();
       if (++shown == arguments.count) return kExitDone;
     }
     client.wait_for_change(MonotonicClock::now() + kInterruptLook);

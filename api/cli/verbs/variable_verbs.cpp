@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <utility>
 
@@ -10,8 +9,10 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/interrupt.hpp"
+#include "api/cli/output.hpp"
 #include "api/cli/rows/variable_rows.hpp"
 #include "api/cli/verbs/host_commands.hpp"
+#include "api/cli/verbs/variable_changes.hpp"
 #include "api/cli/verbs/variable_recording.hpp"
 #include "api/cli/verbs/variable_sampler.hpp"
 #include "api/dds/text.hpp"
@@ -68,14 +69,17 @@ const std::vector<Column>& value_columns() {
   return columns;
 }
 
+void tell_torn(const CliSession& session) {
+  if (session.options.quiet) return;
+  fmt::print(stderr, "plcctl: a task was within a cycle: these values may be of different cycles\n");
+}
+
 int read_variables(CliSession& session, const VariableArguments& arguments) {
   auto sampler = sampler_of(session, arguments);
   if (!sampler) return CliSession::fail(sampler.error());
   const auto sample = sampler->sample();
   if (!sample) return CliSession::fail(sample.error());
-  if (!sample->consistent && !session.options.quiet) {
-    fmt::print(stderr, "plcctl: a task was within a cycle: these values may be of different cycles\n");
-  }
+  if (!sample->consistent) tell_torn(session);
   return show_variables(session, *sampler, sample->variables, value_columns());
 }
 
@@ -148,7 +152,9 @@ int list_forces(CliSession& session, const std::string& instance) {
 void print_change(const CliSession& session, const VariableSampler& sampler, const VariableListing& sample,
                   const plc_VariableRecord& variable) {
   if (session.options.json) {
-    Row row{{"time", time_text(sample.time_unix_ns)}, {"time_unix_ns", sample.time_unix_ns}};
+    Row row{{"time", time_text(sample.time_unix_ns)},
+            {"time_unix_ns", sample.time_unix_ns},
+            {"consistent", sample.consistent}};
     row.update(to_row(variable, owner_of(sampler)));
     fmt::print("{}\n", json_text(row));
     return;
@@ -163,18 +169,19 @@ int watch_variables(CliSession& session, const WatchVariablesArguments& argument
   catch_interrupts();
   auto sampler = sampler_of(session, arguments.which);
   if (!sampler) return CliSession::fail(sampler.error());
-  std::map<std::string, std::string, std::less<>> last;
-  std::uint64_t shown = 0;
+  VariableChanges changes;
+  std::uint64_t lines = 0;
   const SampleTimes times(arguments.interval_s);
   return sample_again_and_again(*sampler, times, TimePoint::max(), [&](const VariableListing& sample) {
-    for (const plc_VariableRecord& variable : sample.variables) {
-      std::string now = fmt::format("{} {}", dds::text_of(variable.value), variable.forced);
-      std::string& before = last[std::string(dds::text_of(variable.name))];
-      if (std::exchange(before, std::move(now)) == before) continue;
-      print_change(session, *sampler, sample, variable);
-      if (++shown == arguments.count) return false;
+    const auto found = changes.look(sample);
+    if (found.is_first_torn) tell_torn(session);
+    for (const std::string& name : found.gone)
+      fmt::print(stderr, "plcctl: the application declares '{}' no longer\n", shown(name));
+    for (const plc_VariableRecord* const variable : found.changed) {
+      print_change(session, *sampler, sample, *variable);
+      if (++lines == arguments.count) return false;
     }
-    std::fflush(stdout);
+    flush_output();
     return true;
   });
 }

@@ -84,6 +84,13 @@ is "$(head -n 1 "$cell/record.csv")" "time,time_unix_ns,consistent,fast.count,fa
 [ "$(wc -l <"$cell/record.csv")" -gt 5 ] || fail "$(cat "$cell/record.csv")"
 awk -F, 'NR > 1 && $4 * 2 != $5 { exit 1 }' "$cell/record.csv" || fail "two values of different cycles: $(cat "$cell/record.csv")"
 
+echo "- a command that goes on until Ctrl-C ends when its output cannot be written, and says so"
+for endless in "watch variables line1 fast.count" "watch tasks line1" "logs line1 -f"; do
+  code=0
+  said=$(timeout 120 "$BIN/plcctl" $endless 2>&1 >/dev/full) || code=$?
+  [ "$code" -eq 1 ] && grep -q 'cannot write the output' <<<"$said" || fail "$endless: exit code $code: $said"
+done
+
 echo "- a recording ends in time, and says that the host was silent then"
 plcctl record variables line1 line.total --interval 0.02 --duration 6 --file "$cell/silent.csv" 2>"$cell/silent.txt" &
 recorder=$!
