@@ -142,6 +142,8 @@ Result<ListedVariable> DebugLink::variable(const std::string& instance, const st
   if (!instance.empty()) {
     auto own = variables(fmt::format("{}.{}", instance, name));
     if (own && own->size() == 1) return own->front();
+    // Such as an index out of the range of an own array.
+    if (!own && own.error().code != ErrorCode::not_found) return std::unexpected(own.error());
   }
   const auto found = variables(name);
   if (found && found->size() == 1) return found->front();

@@ -60,6 +60,8 @@ Result<std::optional<ValuePlace>> DebugService::find_own_value(std::uint32_t pou
   const auto instances = program_.pous().instances_of(pou);
   for (const auto& instance : instances) {
     const auto found = program_.variables().find(fmt::format("{}.{}", instance.path, name));
+    // Such as an index out of the range of an own array.
+    if (!found && found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
     if (!found) continue;
     own = place_of(*found);
     selves.push_back(static_cast<const std::byte*>(instance.self));

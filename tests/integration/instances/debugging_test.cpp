@@ -89,6 +89,7 @@ TEST_F(DebuggingByHand, SaysWhichVariablesAConditionMeans) {
               HasSubstr("no variables of Counter, but of the application: bias"));
   EXPECT_THAT(refused("break Lamp if lit > 0"), HasSubstr("name that of one of them, as 'left.lit'"));
   EXPECT_EQ(command("break Lamp if right.lit > 0").value("remark", "x"), "");
+  EXPECT_THAT(refused("break Main:24 if counter > 3"), HasSubstr("'Main.counter' has members"));
 }
 
 TEST_F(DebuggingByHand, ShowsAndWritesLocalVariables) {
