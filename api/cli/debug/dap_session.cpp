@@ -91,6 +91,17 @@ std::string file_place(std::string_view file, std::int64_t line) {
   return fmt::format("\"{}\":{}", file, line);
 }
 
+// Of a stack: from "startFrame" on, and as many as "levels" says; 0 means all.
+Json part_of(Json frames, const Json& arguments) {
+  const auto size = static_cast<std::int64_t>(frames.size());
+  const std::int64_t first = std::clamp<std::int64_t>(number_in(arguments, "startFrame"), 0, size);
+  const std::int64_t levels = number_in(arguments, "levels");
+  const std::int64_t last = levels > 0 && levels < size - first ? first + levels : size;
+  frames.erase(frames.begin() + last, frames.end());
+  frames.erase(frames.begin(), frames.begin() + first);
+  return frames;
+}
+
 // An order has a greatest length, and the last parts of a path tell most.
 std::string without_first_folders(std::string_view path, std::size_t most) {
   while (path.size() > most) {
@@ -189,6 +200,7 @@ DapSession::Answer DapSession::carry_out(const std::string& command, const Json&
 }
 
 DapSession::Answer DapSession::attach(const Json& arguments) {
+  if (link_.attached()) return failure(ErrorCode::wrong_state, "attached already");
   PLCHOST_TRY_ASSIGN(const auto remark, link_.attach(take_));
   const auto all = arguments.find("haltAllTasks");
   if (all != arguments.end() && *all == true) {
@@ -209,6 +221,7 @@ Result<void> DapSession::remove_of(const std::string& key) {
     const auto done = link_.command(fmt::format("delete {}", ids.back()));
     // One whose place is gone since an online change is no more.
     if (!done && done.error().code != ErrorCode::not_found) return std::unexpected(done.error());
+    news_.has_deleted(ids.back());
     ids.pop_back();
   }
   return {};
@@ -225,11 +238,13 @@ Json DapSession::set_one(const std::string& key, const Result<std::string>& plac
   const auto answer = link_.command(fmt::format("break {}{}", whole, *parts));
   if (!answer) return {{"verified", false}, {"message", answer.error().describe()}};
   const auto id = answer->value("id", 0U);
+  const auto place_line = answer->value("line", std::int64_t{0});
   ids_[key].push_back(id);
+  news_.has_set(id, place_line);
   if (const auto file = answer->value("file", ""); sources_.contains(key) && !file.empty())
     paths_[file] = key;
   if (const auto remark = answer->value("remark", ""); !remark.empty()) tell("important", remark);
-  return {{"verified", true}, {"id", id}, {"line", answer->value("line", 0)}};
+  return {{"verified", true}, {"id", id}, {"line", place_line}};
 }
 
 // All of a source, in the place of those before.
@@ -298,7 +313,7 @@ DapSession::Answer DapSession::stack(const Json& arguments) {
                       {"source", {{"name", last_name(file)}, {"path", path_of(file)}}}});
   }
   const std::size_t total = frames.size();
-  return Json{{"stackFrames", std::move(frames)}, {"totalFrames", total}};
+  return Json{{"stackFrames", part_of(std::move(frames), arguments)}, {"totalFrames", total}};
 }
 
 DapSession::Answer DapSession::go_on(const std::string& command, const Json& arguments) {
@@ -313,7 +328,12 @@ DapSession::Answer DapSession::go_on(const std::string& command, const Json& arg
 
 DapSession::Answer DapSession::pause(const Json& arguments) {
   PLCHOST_TRY_ASSIGN(const auto task, task_of(arguments));
-  PLCHOST_TRY(link_.command("pause " + task));
+  PLCHOST_TRY_ASSIGN(const auto answer, link_.command("pause " + task));
+  if (answer.value("paused", 0U) > 0) return Json::object();
+  PLCHOST_TRY_ASSIGN(state_, link_.state());
+  const Json* const now = task_in(state_, task);
+  if (now != nullptr && now->value("state", "") == "ignored")
+    return failure(ErrorCode::unsupported, answer.value("remark", ""));
   return Json::object();
 }
 
@@ -343,10 +363,24 @@ void DapSession::tell_those_that_go_on() {
   }
 }
 
+void DapSession::tell_changes() {
+  for (const DebugNews::Moved& moved : news_.moved(state_)) {
+    Json breakpoint{{"id", moved.id}, {"verified", moved.line.has_value()}};
+    if (moved.line) {
+      breakpoint["line"] = *moved.line;
+    } else {
+      breakpoint["message"] = "it is gone: the application has no such place any more";
+    }
+    event("breakpoint", {{"reason", "changed"}, {"breakpoint", std::move(breakpoint)}});
+  }
+  for (const std::string& task : news_.ignoring(state_)) tell("important", ignoring_text(task));
+}
+
 Result<void> DapSession::look() {
   if (!link_.attached()) return {};
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   for (const auto& line : news_.lines(state_)) tell(line.is_gap ? "important" : "console", line.text);
+  tell_changes();
   tell_those_that_go_on();
   for (const Json& task : news_.halts(state_)) tell_halt(task);
   return {};

@@ -75,6 +75,8 @@ class DapSession {
   void tell(const std::string& category, const std::string& text);
   void tell_halt(const Json& task);
   void tell_those_that_go_on();
+  /// Tells of the changes that another version of the application or another scheduler has made.
+  void tell_changes();
 
   DebugLink& link_;
   std::function<void(const Json&)> send_;

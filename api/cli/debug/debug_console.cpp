@@ -111,15 +111,25 @@ Result<void> DebugConsole::carry_out(std::string_view verb, const std::string& r
   if (std::ranges::find(kSteps, verb) != kSteps.end()) return go_on(verb, rest);
   if (verb == "delete" || verb == "halts") {
     PLCHOST_TRY(link_.command(fmt::format("{} {}", verb, rest)));
+    if (verb == "delete") has_deleted(rest);
     return {};
   }
   return failure(ErrorCode::invalid_argument,
                  fmt::format("'{}' is no command; 'help' lists them", shown(verb)));
 }
 
+void DebugConsole::has_deleted(const std::string& ids) {
+  if (ids == "*") return news_.has_deleted_all();
+  std::uint32_t id = 0;
+  (void)std::from_chars(ids.data(), ids.data() + ids.size(), id);
+  news_.has_deleted(id);
+}
+
 Result<void> DebugConsole::add_breakpoint(const std::string& rest) {
   PLCHOST_TRY_ASSIGN(const auto answer, link_.command("break " + rest));
-  print_line(fmt::format("breakpoint {} at {}", answer.value("id", 0U), place_text(answer)));
+  const auto id = answer.value("id", 0U);
+  news_.has_set(id, answer.value("line", std::int64_t{0}));
+  print_line(fmt::format("breakpoint {} at {}", id, place_text(answer)));
   if (const std::string remark = answer.value("remark", ""); !remark.empty()) print_line(remark);
   return {};
 }
@@ -342,6 +352,12 @@ Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patie
 void DebugConsole::take(const Json& state) {
   state_ = state;
   for (const auto& line : news_.lines(state)) print_line(line.is_gap ? line.text : "log: " + line.text);
+  for (const DebugNews::Moved& moved : news_.moved(state)) {
+    print_line(moved.line ? fmt::format("breakpoint {} is in line {} now", moved.id, *moved.line)
+                          : fmt::format("breakpoint {} is gone: the application has no such place any more",
+                                        moved.id));
+  }
+  for (const std::string& task : news_.ignoring(state)) print_line(ignoring_text(task));
   for (const Json& task : news_.halts(state)) {
     task_ = task.value("task", "");
     frame_ = 0;

@@ -31,6 +31,7 @@ class DebugConsole {
   void say(const Result<void>& done);
   [[nodiscard]] Result<void> carry_out(std::string_view verb, const std::string& rest);
   [[nodiscard]] Result<void> add_breakpoint(const std::string& rest);
+  void has_deleted(const std::string& ids);
   [[nodiscard]] Result<void> list();
   [[nodiscard]] Result<void> tasks();
   [[nodiscard]] Result<void> stack(const std::string& task);

@@ -56,6 +56,10 @@ Error error_in_frame(const Json& frame, Error error) {
   return error;
 }
 
+std::string ignoring_text(std::string_view task) {
+  return fmt::format("task {} ignores breakpoints: its scheduler halts no tasks of external events", task);
+}
+
 std::vector<DebugNews::Line> DebugNews::lines(const Json& state) {
   std::vector<Line> fresh;
   const auto miss_until = [&](std::uint64_t number) {
@@ -73,6 +77,43 @@ std::vector<DebugNews::Line> DebugNews::lines(const Json& state) {
     fresh.push_back({.text = line.value("text", "")});
   }
   miss_until(state.value("logged", logged_));
+  return fresh;
+}
+
+// Of a state that is too long they are left out.
+std::vector<DebugNews::Moved> DebugNews::moved(const Json& state) {
+  std::vector<Moved> fresh;
+  const auto breakpoints = state.find("breakpoints");
+  if (breakpoints == state.end()) return fresh;
+  for (auto at = lines_.begin(); at != lines_.end();) {
+    const auto found = std::ranges::find_if(
+        *breakpoints, [&](const Json& one) { return one.value("id", std::uint32_t{0}) == at->first; });
+    if (found == breakpoints->end()) {
+      fresh.push_back({.id = at->first, .line = std::nullopt});
+      at = lines_.erase(at);
+      continue;
+    }
+    const auto line = found->value("line", std::int64_t{0});
+    if (std::exchange(at->second, line) != line) fresh.push_back({.id = at->first, .line = line});
+    ++at;
+  }
+  return fresh;
+}
+
+// A task that is stopped says nothing.
+std::vector<std::string> DebugNews::ignoring(const Json& state) {
+  std::vector<std::string> fresh;
+  const bool first = !ignoring_;
+  if (first) ignoring_.emplace();
+  for (const Json& task : state.value("tasks", Json::array())) {
+    const std::string name = task.value("task", "");
+    const std::string what = task.value("state", "");
+    if (what == "ignored") {
+      if (ignoring_->insert(name).second && !first) fresh.push_back(name);
+    } else if (what != "stopped") {
+      ignoring_->erase(name);
+    }
+  }
   return fresh;
 }
 

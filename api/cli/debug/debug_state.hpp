@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,7 +25,11 @@ namespace plchost {
 /// The error of a name that means nothing in a frame. It says which local variables a frame does not show.
 [[nodiscard]] Error error_in_frame(const nlohmann::json& frame, Error error);
 
-/// News in the states of a debugger: each halt and each line of a log point, once.
+/// Tells a debugger of a task that ignores its breakpoints.
+[[nodiscard]] std::string ignoring_text(std::string_view task);
+
+/// News in the states of a debugger, each once: halts, lines of log points, and what another version of the
+/// application or another scheduler has changed.
 class DebugNews {
  public:
   struct Line {
@@ -33,12 +39,26 @@ class DebugNews {
   [[nodiscard]] std::vector<Line> lines(const nlohmann::json& state);
   /// The tasks that have halted.
   [[nodiscard]] std::vector<nlohmann::json> halts(const nlohmann::json& state);
+  /// This debugger has set a breakpoint, or has deleted one.
+  void has_set(std::uint32_t id, std::int64_t line) { lines_[id] = line; }
+  void has_deleted(std::uint32_t id) { lines_.erase(id); }
+  void has_deleted_all() { lines_.clear(); }
+  struct Moved {
+    std::uint32_t id = 0;
+    std::optional<std::int64_t> line;  ///< nothing: it is gone
+  };
+  /// Breakpoints of this debugger that are in another line, or gone.
+  [[nodiscard]] std::vector<Moved> moved(const nlohmann::json& state);
+  /// The tasks that ignore breakpoints, and did not in the first state.
+  [[nodiscard]] std::vector<std::string> ignoring(const nlohmann::json& state);
   /// The number of the last halt of each task that was told.
   [[nodiscard]] const std::map<std::string, std::uint64_t>& told() const noexcept { return told_; }
 
  private:
   std::map<std::string, std::uint64_t> told_;
   std::uint64_t logged_ = 0;
+  std::map<std::uint32_t, std::int64_t> lines_;  // of breakpoints
+  std::optional<std::set<std::string>> ignoring_;
 };
 
 }  // namespace plchost

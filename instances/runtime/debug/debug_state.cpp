@@ -148,14 +148,11 @@ std::string DebugService::state(std::size_t most) const {
     for (const LogLine& line : log_) {
       if (detail.texts) log.push_back({{"number", line.number}, {"text", line.text}});
     }
-    std::string text = dump({{"session", session_},
-                             {"halt_all", halt_all_},
-                             {"suspended", suspended_},
-                             {"tasks", std::move(tasks)},
-                             {"breakpoints", std::move(breakpoints)},
-                             {"log", std::move(log)},
-                             {"logged", log_number_},
-                             {"left_out", detail.left_out}});
+    Json all{{"session", session_},        {"halt_all", halt_all_}, {"suspended", suspended_},
+             {"tasks", std::move(tasks)},  {"log", std::move(log)}, {"logged", log_number_},
+             {"left_out", detail.left_out}};
+    if (detail.breakpoints) all["breakpoints"] = std::move(breakpoints);
+    std::string text = dump(all);
     if (text.size() <= most) return text;
   }
   return dump({{"session", session_}, {"too_long", true}});

@@ -122,6 +122,30 @@ TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
   EXPECT_THAT(instance_.written, ElementsAre("Main.n=5"));
 }
 
+TEST_F(DapSessionTest, TellsTheFramesThatItsClientAsksFor) {
+  const auto frames = [&](int first, int levels) {
+    const json body = ask("stackTrace", {{"threadId", 1}, {"startFrame", first}, {"levels", levels}});
+    EXPECT_EQ(body["totalFrames"], 3);
+    std::vector<int> ids;
+    for (const json& frame : body["stackFrames"]) ids.push_back(frame["id"]);
+    return ids;
+  };
+  EXPECT_THAT(frames(0, 20), ElementsAre(kInnermost, kInnermost + 1, kCaller));
+  EXPECT_THAT(frames(0, 0), ElementsAre(kInnermost, kInnermost + 1, kCaller)) << "all";
+  EXPECT_THAT(frames(0, 1), ElementsAre(kInnermost));
+  EXPECT_THAT(frames(1, 1), ElementsAre(kInnermost + 1));
+  EXPECT_THAT(frames(2, 20), ElementsAre(kCaller));
+  EXPECT_THAT(frames(3, 20), IsEmpty());
+  EXPECT_THAT(frames(-1, -1), ElementsAre(kInnermost, kInnermost + 1, kCaller));
+}
+
+TEST_F(DapSessionTest, TellsWhyAnOwnVariableIsNotRead) {
+  instance_.no_variable = ErrorCode::invalid_argument;  // as of an index out of its range
+  const json response = answer("evaluate", {{"expression", "t[9]"}, {"frameId", kInnermost}});
+  EXPECT_FALSE(response["success"]);
+  EXPECT_EQ(response["message"], "no variable 'Main.c.t[9]'") << "and not that of a global";
+}
+
 TEST_F(DapSessionTest, AFrameOfAFunctionHasItsLocalVariables) {
   constexpr int kFunction = kInnermost + 1;
   const json scopes = ask("scopes", {{"frameId", kFunction}})["scopes"];
@@ -255,6 +279,78 @@ TEST_F(DapSessionTest, TellsItsClientNothingOfATaskThatItHasLetGoItself) {
   sent_.clear();
   ASSERT_TRUE(sut_.look());
   EXPECT_THAT(sent_, IsEmpty());
+}
+
+TEST_F(DapSessionTest, TellsOfBreakpointsThatAnotherVersionOfTheApplicationMovesOrDoesNotHave) {
+  ASSERT_TRUE(sut_.look());
+  instance_.breakpoints = json::array({{{"id", 1}, {"line", 7}}});
+  (void)ask("setFunctionBreakpoints", {{"breakpoints", json::array({{{"name", "Main"}}})}});
+  const auto news = [&] {
+    sent_.clear();
+    EXPECT_TRUE(sut_.look());
+    return sent_;
+  };
+  EXPECT_THAT(news(), IsEmpty());
+  instance_.breakpoints[0]["line"] = 9;
+  auto told = news();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0]["event"], "breakpoint");
+  EXPECT_EQ(told[0]["body"]["reason"], "changed");
+  EXPECT_EQ(told[0]["body"]["breakpoint"], (json{{"id", 1}, {"verified", true}, {"line", 9}}));
+  instance_.breakpoints = json();
+  EXPECT_THAT(news(), IsEmpty()) << "the state is too long to tell them";
+  instance_.breakpoints = json::array();
+  told = news();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0]["body"]["breakpoint"]["verified"], false);
+  EXPECT_THAT(told[0]["body"]["breakpoint"]["message"], HasSubstr("gone"));
+  EXPECT_THAT(news(), IsEmpty()) << "once";
+}
+
+TEST_F(DapSessionTest, TellsNothingOfBreakpointsThatItsClientDeletes) {
+  ASSERT_TRUE(sut_.look());
+  (void)ask("setFunctionBreakpoints", {{"breakpoints", json::array({{{"name", "Main"}}})}});
+  (void)ask("setFunctionBreakpoints", {{"breakpoints", json::array()}});
+  instance_.breakpoints = json::array();
+  sent_.clear();
+  ASSERT_TRUE(sut_.look());
+  EXPECT_THAT(sent_, IsEmpty());
+}
+
+TEST_F(DapSessionTest, TellsOfTasksThatIgnoreBreakpointsUnderAnotherScheduler) {
+  ASSERT_TRUE(sut_.look());
+  const auto news = [&](const std::string& state) {
+    instance_.tasks[1]["state"] = state;
+    sent_.clear();
+    EXPECT_TRUE(sut_.look());
+    return sent_;
+  };
+  instance_.tasks.push_back({{"task", "edge"}});
+  EXPECT_THAT(news("runs"), IsEmpty());
+  EXPECT_THAT(news("stopped"), IsEmpty());
+  const auto told = news("ignored");
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0]["event"], "output");
+  EXPECT_THAT(told[0]["body"]["output"], HasSubstr("edge"));
+  EXPECT_THAT(news("stopped"), IsEmpty());
+  EXPECT_THAT(news("ignored"), IsEmpty()) << "once";
+  EXPECT_THAT(news("runs"), IsEmpty());
+  EXPECT_EQ(news("ignored").size(), 1U);
+}
+
+TEST_F(DapSessionTest, TellsWhyATaskIsNotPaused) {
+  instance_.remark = "breakpoints are ignored in tasks of external events";
+  EXPECT_TRUE(answer("pause", {{"threadId", 1}})["success"]) << "it halts";
+  instance_.tasks[0]["state"] = "ignored";
+  const json response = answer("pause", {{"threadId", 1}});
+  EXPECT_FALSE(response["success"]) << "its client would wait for a halt";
+  EXPECT_EQ(response["message"], instance_.remark);
+}
+
+TEST_F(DapSessionTest, IsAttachedOnce) {
+  const json response = answer("attach");
+  EXPECT_FALSE(response["success"]);
+  EXPECT_EQ(response["message"], "attached already");
 }
 
 TEST_F(DapSessionTest, SetsFunctionBreakpointsByTheirNames) {

@@ -28,10 +28,13 @@ inline plc_VariableRecord variable_record(std::string_view name, std::string_vie
 struct DebuggedInstance {
   nlohmann::json tasks = nlohmann::json::array();  ///< of its state
   std::vector<plc_VariableRecord> variables;
-  std::vector<std::string> commands;  ///< that came, without the number of the session
-  std::vector<std::string> written;   ///< NAME=VALUE
-  bool busy = false;                  ///< it refuses commands
-  std::string file;                   ///< in which it sets breakpoints; empty: it does not say
+  std::vector<std::string> commands;             ///< that came, without the number of the session
+  std::vector<std::string> written;              ///< NAME=VALUE
+  bool busy = false;                             ///< it refuses commands
+  std::string file;                              ///< in which it sets breakpoints; empty: it does not say
+  std::string remark;                            ///< of its answers
+  nlohmann::json breakpoints;                    ///< of its state; null: they are left out
+  ErrorCode no_variable = ErrorCode::not_found;  ///< its answer for a name that it does not have
 
   /// Each variable to the value that it has; of arrays some elements.
   void force_all() {
@@ -58,7 +61,9 @@ struct DebuggedInstance {
     return {.call = [this](ControlVerb verb, const std::string& argument) { return answer(verb, argument); },
             .list_variables = [this](const VariableQuery& query) { return list(query.patterns.front()); },
             .read_state = [this](const DebugQuery& /*query*/) -> Result<DebugPart> {
-              const std::string state = nlohmann::json{{"session", 1}, {"tasks", tasks}}.dump();
+              nlohmann::json told{{"session", 1}, {"tasks", tasks}};
+              if (!breakpoints.is_null()) told["breakpoints"] = breakpoints;
+              const std::string state = told.dump();
               return DebugPart{.version = 1, .size = state.size(), .text = state};
             }};
   }
@@ -72,7 +77,7 @@ struct DebuggedInstance {
     if (argument.starts_with("attach")) return std::string(R"({"session":1})");
     if (busy) return failure(ErrorCode::busy, "it is busy");
     commands.push_back(argument.substr(argument.find(' ') + 1));
-    return nlohmann::json{{"id", 1}, {"line", 7}, {"file", file}}.dump();
+    return nlohmann::json{{"id", 1}, {"line", 7}, {"file", file}, {"remark", remark}}.dump();
   }
 
   // "PATH.*", or a whole name; that of an array is without its brackets.
@@ -84,8 +89,7 @@ struct DebuggedInstance {
       const std::string_view name = dds::text_of(variable.name);
       return all ? name.starts_with(pattern) : name.substr(0, name.find('[')) == pattern;
     });
-    if (page.variables.empty())
-      return failure(ErrorCode::not_found, fmt::format("no variable '{}'", pattern));
+    if (page.variables.empty()) return failure(no_variable, fmt::format("no variable '{}'", pattern));
     return page;
   }
 };
