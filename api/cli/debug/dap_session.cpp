@@ -203,7 +203,8 @@ DapSession::Answer DapSession::attach(const Json& arguments) {
   if (link_.attached()) return failure(ErrorCode::wrong_state, "attached already");
   PLCHOST_TRY_ASSIGN(const auto remark, link_.attach(take_));
   const auto all = arguments.find("haltAllTasks");
-  if (all != arguments.end() && *all == true) {
+  halts_all_ = all != arguments.end() && *all == true;
+  if (halts_all_) {
     PLCHOST_TRY(link_.command("halts all"));
   }
   PLCHOST_TRY_ASSIGN(state_, link_.state());
@@ -320,10 +321,31 @@ DapSession::Answer DapSession::go_on(const std::string& command, const Json& arg
   static const std::map<std::string, std::string> words = {
       {"continue", "continue"}, {"next", "next"}, {"stepIn", "step"}, {"stepOut", "out"}};
   PLCHOST_TRY_ASSIGN(const auto task, task_of(arguments));
+  const bool alone = !halts_all_ || arguments.value("singleThread", Json()) == true;
+  if (command == "continue" && !alone) {
+    PLCHOST_TRY(link_.command("continue *"));
+    halted_.clear();
+    return Json{{"allThreadsContinued", true}};
+  }
+  if (!alone) {
+    PLCHOST_TRY(let_others_go(task));
+  }
   PLCHOST_TRY(link_.command(fmt::format("{} {}", words.at(command), task)));
   halted_.erase(task);
   if (command == "continue") return Json{{"allThreadsContinued", false}};
   return Json::object();
+}
+
+// The end of the step halts them again.
+Result<void> DapSession::let_others_go(const std::string& task) {
+  PLCHOST_TRY_ASSIGN(state_, link_.state());
+  for (const Json& other : state_.value("tasks", Json::array())) {
+    const std::string name = other.value("task", "");
+    if (name == task || other.value("state", "") != "halted") continue;
+    const auto done = link_.command("continue " + name);
+    if (!done && done.error().code != ErrorCode::wrong_state) return std::unexpected(done.error());
+  }
+  return {};
 }
 
 DapSession::Answer DapSession::pause(const Json& arguments) {

@@ -57,6 +57,8 @@ class DapSession {
   [[nodiscard]] Answer set_variable(const Json& arguments);
   [[nodiscard]] Answer evaluate(const Json& arguments);
   [[nodiscard]] Answer go_on(const std::string& command, const Json& arguments);
+  /// Those that halt, but for this task.
+  [[nodiscard]] Result<void> let_others_go(const std::string& task);
   [[nodiscard]] Answer pause(const Json& arguments);
   /// The value that a name means in a frame.
   [[nodiscard]] Answer evaluated(const Json& frame, const std::string& name, const std::string& context);
@@ -81,6 +83,7 @@ class DapSession {
   DebugLink& link_;
   std::function<void(const Json&)> send_;
   bool take_;
+  bool halts_all_ = false;  // a breakpoint halts all tasks
   std::int64_t sequence_ = 1;
   Json state_;
   std::vector<std::string> tasks_;  // thread 1 is the first

@@ -11,7 +11,7 @@ namespace plchost {
 /// Looks at the same variables again and again.
 class VariableChanges {
  public:
-  /// What a look has found.
+  /// The result of a look.
   struct Found {
     std::vector<const plc_VariableRecord*> changed;  ///< in the sample
     std::vector<std::string> gone;                   ///< names that the sample before had

@@ -347,6 +347,27 @@ TEST_F(DapSessionTest, TellsWhyATaskIsNotPaused) {
   EXPECT_EQ(response["message"], instance_.remark);
 }
 
+TEST_F(DapSessionTest, LetsOneTaskGoOnIfEachHaltsByItself) {
+  instance_.halt("slow", 1, json::array());
+  EXPECT_EQ(ask("continue", {{"threadId", 1}})["allThreadsContinued"], false);
+  (void)ask("next", {{"threadId", 1}});
+  EXPECT_THAT(instance_.commands, ElementsAre("continue fast", "next fast"));
+}
+
+TEST_F(DapSessionTest, LetsAllTasksGoOnIfTheyHaltTogether) {
+  EXPECT_FALSE(sut_.obey({{"seq", 1}, {"command", "disconnect"}}));
+  instance_.halt("slow", 1, json::array());
+  instance_.tasks.push_back({{"task", "edge"}, {"state", "runs"}});
+  (void)ask("attach", {{"haltAllTasks", true}});
+  instance_.commands.clear();
+  EXPECT_EQ(ask("continue", {{"threadId", 1}})["allThreadsContinued"], true);
+  EXPECT_EQ(ask("continue", {{"threadId", 1}, {"singleThread", true}})["allThreadsContinued"], false);
+  (void)ask("next", {{"threadId", 1}});
+  (void)ask("stepIn", {{"threadId", 2}, {"singleThread", true}});
+  EXPECT_THAT(instance_.commands,
+              ElementsAre("continue *", "continue fast", "continue slow", "next fast", "step slow"));
+}
+
 TEST_F(DapSessionTest, IsAttachedOnce) {
   const json response = answer("attach");
   EXPECT_FALSE(response["success"]);

@@ -1,4 +1,4 @@
-// What a watch of variables tells.
+// The news of a watch of variables.
 #include "api/cli/verbs/variable_changes.hpp"
 
 #include <initializer_list>
