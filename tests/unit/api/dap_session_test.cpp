@@ -143,7 +143,7 @@ TEST_F(DapSessionTest, TellsWhyAnOwnVariableIsNotRead) {
   instance_.no_variable = ErrorCode::invalid_argument;  // as of an index out of its range
   const json response = answer("evaluate", {{"expression", "t[9]"}, {"frameId", kInnermost}});
   EXPECT_FALSE(response["success"]);
-  EXPECT_EQ(response["message"], "no variable 'Main.c.t[9]'") << "and not that of a global";
+  EXPECT_EQ(response.value("message", ""), "no variable 'Main.c.t[9]'") << "and not that of a global";
 }
 
 TEST_F(DapSessionTest, AFrameOfAFunctionHasItsLocalVariables) {
@@ -344,7 +344,7 @@ TEST_F(DapSessionTest, TellsWhyATaskIsNotPaused) {
   instance_.tasks[0]["state"] = "ignored";
   const json response = answer("pause", {{"threadId", 1}});
   EXPECT_FALSE(response["success"]) << "its client would wait for a halt";
-  EXPECT_EQ(response["message"], instance_.remark);
+  EXPECT_EQ(response.value("message", ""), instance_.remark);
 }
 
 TEST_F(DapSessionTest, LetsOneTaskGoOnIfEachHaltsByItself) {
@@ -371,7 +371,7 @@ TEST_F(DapSessionTest, LetsAllTasksGoOnIfTheyHaltTogether) {
 TEST_F(DapSessionTest, IsAttachedOnce) {
   const json response = answer("attach");
   EXPECT_FALSE(response["success"]);
-  EXPECT_EQ(response["message"], "attached already");
+  EXPECT_EQ(response.value("message", ""), "attached already");
 }
 
 TEST_F(DapSessionTest, SetsFunctionBreakpointsByTheirNames) {
