@@ -8,6 +8,8 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <stdio_ext.h>
+#include <unistd.h>
 
 #include "api/cli/interrupt.hpp"
 #include "api/cli/rows/variable_rows.hpp"
@@ -25,31 +27,46 @@ struct RecordArguments {
   std::string file;       // empty: the standard output
 };
 
-/// Writes samples as CSV: a line with the names, then one for each sample.
+/// Writes samples as CSV: a line with the names, then one for each sample. Of a file of its own no line is
+/// left that could not be written whole: its last value would be another one.
 class Recording {
  public:
-  explicit Recording(std::FILE* file) noexcept : file_(file) {}
+  Recording(std::FILE* file, bool own) noexcept : file_(file), own_(own) {}
 
   /// wrong_state: the application has other variables by now. system: the file takes no more.
   Result<void> add(const VariableListing& sample) {
     std::string names = recording_head(sample);
+    std::string text;
     if (names_.empty()) {
-      fmt::print(file_, "{}\n", names);
+      text = names + "\n";
       names_ = std::move(names);
     } else if (names != names_) {
       return failure(ErrorCode::wrong_state,
                      "the application has other variables than when the recording began");
     }
-    fmt::print(file_, "{}\n", recording_line(sample));
+    text += recording_line(sample) + "\n";
+    if (std::fwrite(text.data(), 1, text.size(), file_) != text.size() || std::fflush(file_) != 0) {
+      const int error = errno;
+      if (own_) cut();
+      return failure(ErrorCode::system,
+                     fmt::format("cannot write the recording, which ends after {} samples", samples_), error);
+    }
+    bytes_ += static_cast<off_t>(text.size());
     ++samples_;
-    if (std::fflush(file_) != 0 || std::ferror(file_) != 0)
-      return failure(ErrorCode::system, "cannot write the recording", errno);
     return {};
   }
   [[nodiscard]] std::uint64_t samples() const noexcept { return samples_; }
 
  private:
+  // A device or pipe cannot be cut.
+  void cut() noexcept {
+    ::__fpurge(file_);
+    (void)!::ftruncate(::fileno(file_), bytes_);
+  }
+
   std::FILE* file_;
+  bool own_;
+  off_t bytes_ = 0;  // of whole lines
   std::string names_;
   std::uint64_t samples_ = 0;
 };
@@ -73,7 +90,7 @@ int record(CliSession& session, const RecordArguments& arguments) {
       file.reset(std::fopen(arguments.file.c_str(), "we"));
       if (!file) return failure(ErrorCode::system, "cannot write " + arguments.file, errno);
     }
-    recording.emplace(file ? file.get() : stdout);
+    recording.emplace(file ? file.get() : stdout, file != nullptr);
     return {};
   };
   const TimePoint begin = MonotonicClock::now();

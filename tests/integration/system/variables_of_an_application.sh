@@ -91,6 +91,12 @@ for endless in "watch variables line1 fast.count" "watch tasks line1" "logs line
   [ "$code" -eq 1 ] && grep -q 'cannot write the output' <<<"$said" || fail "$endless: exit code $code: $said"
 done
 
+echo "- a recording that finds no more room ends with a whole line, and says so"
+code=0
+said=$(trap '' XFSZ; ulimit -f 2; "$BIN/plcctl" --timeout 10 record variables line1 'fast.*' line.label --interval 0.01 --file "$cell/full.csv" 2>&1) || code=$?
+[ "$code" -eq 1 ] && grep -q 'cannot write the recording, which ends after [0-9]* samples' <<<"$said" || fail "exit code $code: $said"
+awk -F, 'NF != 7 { exit 1 }' "$cell/full.csv" && is "$(tail -c 1 "$cell/full.csv" | wc -l)" 1 || fail "the last line is not whole: $(tail -n 2 "$cell/full.csv")"
+
 echo "- a recording ends in time, and says that the host was silent then"
 plcctl record variables line1 line.total --interval 0.02 --duration 6 --file "$cell/silent.csv" 2>"$cell/silent.txt" &
 recorder=$!
