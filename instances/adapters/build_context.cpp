@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdlib>
+#include <cstring>
 #include <iterator>
 #include <sstream>
 
@@ -72,9 +73,14 @@ bool BuildContext::compile(const char* what, std::vector<std::string> words,
   if (!end || end->success()) return end.has_value();
   for (const iec::SourceProblem& problem : problems_of_compiler(end->output, find_source))
     fail({problem.place, fmt::format("{}: {}", what, problem.text)});
-  if (good()) {
-    fail(fmt::format("{} refuses what was written for it:{}", what,
-                     first_lines(std::string(from_first_error(end->output)))));
+  const std::string said = first_lines(std::string(from_first_error(end->output)));
+  if (good() && end->signal != 0) {
+    fail(fmt::format("{} was ended by SIG{}{}{}", what, ::sigabbrev_np(end->signal), said.empty() ? "" : ":",
+                     said));
+  } else if (good() && said.empty()) {
+    fail(fmt::format("{} has ended with exit code {}, and has not said why", what, end->exit_code));
+  } else if (good()) {
+    fail(fmt::format("{} refuses what was written for it:{}", what, said));
   }
   return false;
 }

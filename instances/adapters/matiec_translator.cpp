@@ -9,6 +9,7 @@
 
 #include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/matiec/complements.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/initial_values.hpp"
@@ -165,8 +166,8 @@ class MatiecTranslator : public Translator {
   [[nodiscard]] std::optional<std::string> read_code() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return std::nullopt;
-    return matiec::with_marked_initial_values(
-        iec::with_ended_escapes(matiec::with_first_turns(*code), kTextMacro));
+    return matiec::with_marked_initial_values(iec::with_ended_escapes(
+        matiec::with_narrow_complements(matiec::with_first_turns(*code)), kTextMacro));
   }
 
   bool drop_directives() {

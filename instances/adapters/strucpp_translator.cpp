@@ -2,6 +2,7 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,8 +13,11 @@
 #include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/strucpp/compiler.hpp"
 #include "instances/adapters/strucpp/glue.hpp"
+#include "instances/adapters/strucpp/line_directives.hpp"
 #include "instances/adapters/strucpp/plan_file.hpp"
+#include "instances/adapters/strucpp/source_text.hpp"
 #include "instances/adapters/strucpp/statements.hpp"
+#include "instances/adapters/strucpp/temporaries.hpp"
 #include "instances/adapters/translator.hpp"
 
 namespace plchost {
@@ -60,7 +64,8 @@ class StrucppTranslator : public Translator {
   bool translate() override {
     auto c = context_.words_of("CC", "cc");
     auto cpp = context_.words_of("CXX", "c++");
-    if (!c || !cpp || !end_escapes() || (context_.order.debug && !instrument())) return false;
+    if (!c || !cpp || !mend_code() || (context_.order.debug && !instrument()) || !renew_temporaries())
+      return false;
     words_ = *std::move(cpp);
     find_flags();
     const std::string adapters = context_.adapters();
@@ -116,10 +121,23 @@ class StrucppTranslator : public Translator {
     if (end && end->success()) flags_.push_back(flag);
   }
 
-  bool end_escapes() {
+  bool mend_code() {
     std::vector<std::string> files = files_;
     files.emplace_back("generated.hpp");
-    return context_.rewrite(files, [](const std::string& code) { return iec::with_ended_escapes(code); });
+    const auto find_file = [this](std::string_view pou) { return file_of(pou); };
+    return context_.rewrite(files, [&](const std::string& code) {
+      return strucpp::with_files_of_pous(iec::with_ended_escapes(code), find_file);
+    });
+  }
+  // As the compiler knows it.
+  [[nodiscard]] std::optional<std::string> file_of(std::string_view pou) const {
+    const iec::Pou* const known = context_.project.pou(pou);
+    if (known == nullptr) return std::nullopt;
+    for (std::size_t i = 0; i < context_.sources.size(); ++i) {
+      const std::string& source = context_.sources[i].file;
+      if (source == known->place.file) return name_for_compiler(source, i);
+    }
+    return std::nullopt;
   }
 
   bool instrument() {
@@ -140,11 +158,29 @@ class StrucppTranslator : public Translator {
     return context_.has(context_.folder().write(std::string(iec::kDebugFile), iec::debug_header(pous_)));
   }
 
+  // The compiler keeps temporary variables from call to call.
+  bool renew_temporaries() {
+    return context_.rewrite(files_, [this](const std::string& code) {
+      return strucpp::with_new_temporaries(code, context_.project);
+    });
+  }
+
   bool write_order() {
     nlohmann::json list = nlohmann::json::array();
+    const std::set<std::string> enumerations = strucpp::enumerations_in(context_.sources);
     for (std::size_t i = 0; i < context_.sources.size(); ++i) {
       const iec::Source& source = context_.sources[i];
-      list.push_back({{"name", name_for_compiler(source.file, i)}, {"text", source.text}});
+      const strucpp::SourceText made = strucpp::text_for_strucpp(source, enumerations);
+      nlohmann::json places = nlohmann::json::array();
+      for (const auto& [line, name, location] : made.places)
+        places.push_back({{"line", line}, {"name", name}, {"location", location}});
+      nlohmann::json inserted = nlohmann::json::array();
+      for (const auto& [line, column, characters] : made.inserted)
+        inserted.push_back({{"line", line}, {"column", column}, {"length", characters}});
+      list.push_back({{"name", name_for_compiler(source.file, i)},
+                      {"text", made.text},
+                      {"places", std::move(places)},
+                      {"inserted", std::move(inserted)}});
     }
     // A byte that is no UTF-8 becomes a sign that the compiler refuses, unless it stands in a comment.
     const std::string text = nlohmann::json{{"sources", std::move(list)}}.dump(
@@ -171,12 +207,7 @@ class StrucppTranslator : public Translator {
     context_.refuse_persistent(project, "STruC++");
     for (const iec::Configuration& configuration : project.configurations) {
       for (const iec::Resource& resource : configuration.resources) {
-        for (const iec::Variable& global : resource.globals) {
-          context_.fail(
-              {global.place, fmt::format("{}: STruC++ knows no VAR_GLOBAL in a RESOURCE; declare it "
-                                         "in the CONFIGURATION",
-                                         global.name)});
-        }
+        if (configuration.resources.size() > 1) refuse_globals(resource);
         for (const iec::Program& program : resource.programs) {
           if (!program.connected) continue;
           context_.fail({program.place, fmt::format("PROGRAM {}: STruC++ cannot translate connections in "
@@ -184,6 +215,15 @@ class StrucppTranslator : public Translator {
                                                     program.name, program.type)});
         }
       }
+    }
+  }
+
+  // Those of a single resource were moved to the configuration.
+  void refuse_globals(const iec::Resource& resource) {
+    for (const iec::Variable& global : resource.globals) {
+      context_.fail({global.place, fmt::format("{}: STruC++ knows no VAR_GLOBAL in a RESOURCE; declare it "
+                                               "in the CONFIGURATION",
+                                               global.name)});
     }
   }
 

@@ -48,6 +48,7 @@ class Planner {
   }
 
   TaskPlan plan() {
+    if (is_first_) check_declared();
     find_located();
     for (const Task& task : resource_.tasks) add(task);
     for (const Program& program : resource_.programs) {
@@ -261,6 +262,19 @@ class Planner {
                        letter, kMostUsers)});
     }
   }
+  // iec2c ends without a place for two types of one name, and STruC++ takes one of them without a word.
+  void check_declared() {
+    std::map<std::string, const char*> kinds;
+    const auto take = [&](const std::string& name, const SourcePlace& place, const char* kind) {
+      const auto [entry, is_new] = kinds.try_emplace(folded(name), kind);
+      if (is_new || name.empty() || place.file.empty()) return;
+      plan_.problems.push_back({place, fmt::format("'{}' is the name of {}, too: call one of them otherwise",
+                                                   name, entry->second)});
+    };
+    for (const DeclaredType& type : project_.types) take(type.name, type.place, "a TYPE");
+    for (const Pou& pou : project_.pous) take(pou.name, pou.place, "a POU");
+  }
+
   // In the C of iec2c tasks, instances of programs, POUs and types have their names as they are, in upper
   // case.
   void check_names() {

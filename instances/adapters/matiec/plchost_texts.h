@@ -1,7 +1,8 @@
 /*
- * MID, INSERT, DELETE and REPLACE for the programs of MATIEC. Its own library cuts the new text of REPLACE
- * to the length of the old one. It counts lengths modulo 256, and reads before a text if P is 0. This is a
- * part of plchost_library.h, which includes it behind that library.
+ * MID, INSERT, DELETE, REPLACE and FIND for the programs of MATIEC. Its own library cuts the new text of
+ * REPLACE to the length of the old one. It counts lengths modulo 256, and reads before a text if P is 0. FIND
+ * passes over a text that begins within one that it has begun to compare. This is a part of
+ * plchost_library.h, which includes it behind that library.
  */
 #ifndef PLCHOST_TEXTS_H
 #define PLCHOST_TEXTS_H
@@ -53,7 +54,17 @@ static inline STRING plchost_replace(BOOL EN, BOOL* ENO, STRING text, STRING oth
   return plchost_put(text, other, length, position - 1);
 }
 
-/* iec2c calls a function by the types of its arguments. */
+/* 0: the text is empty, or not there. */
+static inline int plchost_find(BOOL EN, BOOL* ENO, STRING text, STRING wanted) {
+  int first;
+  if (!plchost_text_is_wanted(EN, ENO, TRUE) || wanted.len == 0) return 0;
+  for (first = 0; first + wanted.len <= text.len; ++first) {
+    if (memcmp(&text.body[first], wanted.body, (size_t)wanted.len) == 0) return first + 1;
+  }
+  return 0;
+}
+
+/* iec2c calls a function by the types of its result and its arguments. */
 #define MID__STRING__STRING__SINT__SINT plchost_mid
 #define MID__STRING__STRING__INT__INT plchost_mid
 #define MID__STRING__STRING__DINT__DINT plchost_mid
@@ -86,5 +97,13 @@ static inline STRING plchost_replace(BOOL EN, BOOL* ENO, STRING text, STRING oth
 #define REPLACE__STRING__STRING__STRING__UINT__UINT plchost_replace
 #define REPLACE__STRING__STRING__STRING__UDINT__UDINT plchost_replace
 #define REPLACE__STRING__STRING__STRING__ULINT__ULINT plchost_replace
+#define FIND__SINT__STRING__STRING plchost_find
+#define FIND__INT__STRING__STRING plchost_find
+#define FIND__DINT__STRING__STRING plchost_find
+#define FIND__LINT__STRING__STRING plchost_find
+#define FIND__USINT__STRING__STRING plchost_find
+#define FIND__UINT__STRING__STRING plchost_find
+#define FIND__UDINT__STRING__STRING plchost_find
+#define FIND__ULINT__STRING__STRING plchost_find
 
 #endif

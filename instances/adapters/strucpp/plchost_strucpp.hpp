@@ -1,4 +1,4 @@
-// Included before all C++ that STruC++ has written: its library, with two parts that suit a host.
+// Included before all C++ that STruC++ has written: its library, with parts that suit a host.
 #ifndef PLCHOST_STRUCPP_HPP
 #define PLCHOST_STRUCPP_HPP
 
@@ -7,7 +7,9 @@
 #include <cstdlib>
 #include <ctime>
 #include <exception>
+#include <memory>
 #include <mutex>
+#include <new>
 #include <type_traits>
 #include <utility>
 
@@ -55,6 +57,22 @@ inline IEC_TIME plchost_time() {
 }
 }  // namespace strucpp
 #define TIME(...) plchost_time(__VA_ARGS__)
+
+// INSERT puts a text behind position P, and that of the library before it.
+namespace strucpp {
+template <class Text, class Other>
+inline auto plchost_insert(const Text& text, const Other& other, long behind) {
+  return INSERT(text, other, behind < 0 ? 0 : static_cast<size_t>(behind) + 1);
+}
+}  // namespace strucpp
+#define INSERT plchost_insert
+
+// A temporary variable, which the library keeps from call to call, has its initial value again.
+template <class T, class... Values>
+inline void plchost_renew(T& variable, Values&&... values) {
+  std::destroy_at(&variable);
+  ::new (static_cast<void*>(&variable)) T(std::forward<Values>(values)...);
+}
 
 // The part of a copy that is exchanged at a time: of an array an element. Not evaluated.
 template <class T>

@@ -166,7 +166,7 @@ class Instrumenter {
     body_.reset();
   }
 
-  // The compiler names its first source in each "#line N "FILE"".
+  // "#line N "FILE""
   void add_statement(std::string_view directive) {
     directive.remove_prefix(kLine.size());
     unsigned line = 0;

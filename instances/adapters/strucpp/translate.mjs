@@ -1,5 +1,7 @@
 // Calls the compiler STruC++ for `plcctl build application`: node translate.mjs FOLDER_OF_THE_COMPILER, in the
-// folder for the files between. Reads order.json there: {"sources": [{"name", "text"}]}. Writes the C++ files and
+// folder for the files between. Reads order.json there: {"sources": [{"name", "text", "places": [{"line", "name",
+// "location"}], "inserted": [{"line", "column", "length"}]}]}. A place is one that plcctl has taken out of the text, for
+// the compiler lets no two variables have one. Inserted is what it has put in. Writes the C++ files and
 // plan.json: what is wrong, else the program's tasks, POUs, types and variables, which plcctl checks and plans.
 // Exit code 0: plan.json was written, also if the program has errors.
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
@@ -17,6 +19,11 @@ const { compile, discoverStlibs, StdFunctionRegistry } = await import(pathToFile
 
 const fileNumbers = new Map(sources.map((source, i) => [source.name, i]));
 const lines = sources.map((source) => source.text.split('\n'));
+
+// Places that the text has no more, by file, line and name.
+const places = new Map(
+  sources.flatMap((source, number) => (source.places ?? []).map((one) => [`${number}:${one.line}:${one.name}`, { ...one, number }])),
+);
 
 function place(file, line, column) {
   return [fileNumbers.get(file) ?? -1, line > 0 ? line : 0, column > 0 ? column : 0];
@@ -73,12 +80,20 @@ function explained(found) {
   return place === undefined ? undefined : { place, text: found.message };
 }
 
+// Of some messages the compiler knows the line only: the last file that has one of its words there.
+function fileOf({ message: text, line }) {
+  const words = (text.match(/\w+/g) ?? []).filter((word) => word === word.toUpperCase());
+  const has = (number) => words.some((word) => new RegExp(`\\b${word}\\b`, 'i').test(lines[number][line - 1] ?? ''));
+  const number = sources.findLastIndex((source, i) => has(i));
+  return sources[Math.max(number, 0)].name;
+}
+
 function message(found) {
   const known = found.line > 0 ? undefined : explained(found);
   const hint = found.suggestion === undefined ? '' : ` ${found.suggestion}`;
   // A message of several lines is told as one.
   const text = `${known?.text ?? found.message}${hint}`.replace(/[\0-\x1f\x7f]+/g, ' ').slice(0, 1000);
-  return { place: known?.place ?? place(found.file ?? sources[0].name, found.line, found.column), text };
+  return { place: known?.place ?? place(found.file ?? fileOf(found), found.line, found.column), text };
 }
 
 // A POU of the program and one of a library with the same name would both go into the C++. That of the program counts.
@@ -153,6 +168,18 @@ const kRanges = new Map(
     [['USINT', 'UINT', 'UDINT', 'ULINT'][i], [0n, (1n << bits) - 1n]],
   ]),
 );
+
+const kLongNames = new Map([
+  ['DATE_AND_TIME', 'DT'],
+  ['TIME_OF_DAY', 'TOD'],
+  ['LDATE', 'DATE'],
+  ['LTOD', 'TOD'],
+  ['LTIME_OF_DAY', 'TOD'],
+  ['LDT', 'DT'],
+  ['LDATE_AND_TIME', 'DT'],
+  ['LTIME', 'TIME'],
+  ['WSTRING', 'STRING'],
+]);
 
 // Of a number; undefined: of another expression.
 function integerOf(node) {
@@ -266,13 +293,21 @@ class Plan {
     return text;
   }
 
+  placeOfFirst(declaration, node) {
+    const [number, line] = placeOf(node);
+    const found = places.get(`${number}:${line}:${declaration.names[0].toUpperCase()}`);
+    if (found === undefined) return '';
+    found.isTaken = true;
+    return found.location;
+  }
+
   // A declared variable; of an array of function blocks its elements.
   variables(block, declaration, name, member, node) {
     const sections = { VAR_INPUT: 'input', VAR_OUTPUT: 'output', VAR_IN_OUT: 'in_out', VAR_TEMP: 'temporary', VAR_EXTERNAL: 'external', VAR_GLOBAL: 'global' };
     const variable = {
       name,
       type: this.typeText(declaration.type),
-      location: declaration.address ?? '',
+      location: declaration.address ?? this.placeOfFirst(declaration, node),
       section: sections[block.blockType] ?? 'local',
       retain: block.isRetain === true,
       constant: block.isConstant === true,
@@ -280,7 +315,7 @@ class Plan {
       member: member ?? '',
     };
     if (member === undefined && variable.section !== 'external') variable.section = 'other';
-    if (declaration.initialValue?.kind === 'ArrayLiteralExpression') this.dropped.set(`${variable.place}`, variable);
+    this.noteDropped(declaration, name);
     const element = declaration.type.elementTypeName?.toUpperCase();
     const type = element ?? declaration.type.name.toUpperCase();
     if (/^CTU?D(_\w+)?$/.test(type) && !this.blocks.has(type)) this.remark(node, `${name}: STruC++ counts falling edges of CD of ${type}; IEC 61131-3 counts rising ones`);
@@ -308,8 +343,15 @@ class Plan {
     }));
   }
 
+  noteDropped(declaration, name) {
+    if (declaration.initialValue?.kind === 'ArrayLiteralExpression') this.dropped.set(`${placeOf(declaration)}`, { place: placeOf(declaration), name });
+  }
+
   // The compiler says nothing of either.
   checkWhatIsDropped() {
+    for (const { name, definition } of this.ast.types) {
+      for (const field of definition.kind === 'StructDefinition' ? definition.fields : []) this.noteDropped(field, `${name}.${field.names[0]}`);
+    }
     for (const { place, name } of this.dropped.values()) {
       this.remarks.push({ place, text: `STruC++ drops the initial values of the array ${name}: its elements begin with zeros` });
     }
@@ -328,6 +370,31 @@ class Plan {
     const problems = [];
     for (const node of nodesIn(this.ast)) {
       const text = literalProblem(node, initial.has(node), nanosecondsOf);
+      if (text !== undefined) problems.push({ place: placeOf(node), text });
+    }
+    return problems.sort(byPlace);
+  }
+
+  // It has dates in days, and dates with a time in nanoseconds, and does not convert one to the other.
+  checkTimes() {
+    const typeOf = (node) => kLongNames.get(node?.resolvedType?.name) ?? node?.resolvedType?.name;
+    const problems = [];
+    for (const node of nodesIn(this.ast)) {
+      let text;
+      if (node.kind === 'BinaryExpression' && (node.operator === '-' || node.operator === '+')) {
+        const [left, right] = [typeOf(node.left), typeOf(node.right)];
+        const isOfDays = (left === 'DATE' && (right === 'DATE' || right === 'TIME')) || (left === 'TIME' && right === 'DATE');
+        if (isOfDays) text = `STruC++ counts days here, and nanoseconds in a TIME: write DT in the place of DATE`;
+      } else if (node.kind === 'FunctionCallExpression' && !this.functions.has(node.functionName.toUpperCase())) {
+        const name = node.functionName.toUpperCase();
+        const [, written, to] = /^(?:(\w+)_)?TO_(\w+)$/.exec(name) ?? [];
+        const from = kLongNames.get(written) ?? written ?? typeOf(node.arguments[0]?.value);
+        const target = kLongNames.get(to) ?? to;
+        const isOfDates = ['DATE', 'TOD', 'DT'].includes(from) && ['DATE', 'TOD', 'DT'].includes(target) && from !== target;
+        if (isOfDates) text = `${name}: STruC++ copies the number, which counts days in a DATE, and nanoseconds in TOD and DT`;
+        if (from === 'STRING' && target === 'BOOL') text = `${name}: STruC++ makes TRUE of each text; compare it with 'TRUE'`;
+        if (['DATE', 'TOD', 'DT', 'TIME'].includes(from) && target === 'STRING') this.remark(node, `${name}: STruC++ writes the number of ${from === 'DATE' ? 'days' : 'nanoseconds'}`);
+      }
       if (text !== undefined) problems.push({ place: placeOf(node), text });
     }
     return problems.sort(byPlace);
@@ -530,6 +597,14 @@ async function timesOfCompiler() {
   return existsSync(model) ? (await import(pathToFileURL(model).href)).parseTimeLiteral : undefined;
 }
 
+// Of the source, without what was inserted.
+function inSource({ place: [file, line, column], ...rest }) {
+  for (const one of sources[file]?.inserted ?? []) {
+    if (one.line === line && one.column < column) column -= Math.min(one.length, column - one.column);
+  }
+  return { ...rest, place: [file, line, column] };
+}
+
 // The compiler counts units of UTF-16.
 function inCharacters({ place: [file, line, column], ...rest }) {
   const before = (lines[file]?.[line - 1] ?? '').slice(0, Math.max(column - 1, 0));
@@ -553,7 +628,10 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
-  plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()));
+  plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()), ...found.checkTimes());
+  for (const { number, line, name, location, isTaken } of places.values()) {
+    if (isTaken !== true) plan.problems.push({ place: [number, line, 0], text: `${name} AT ${location}: the declaration is not understood` });
+  }
   found.checkLoops();
   const table = await debugTable(result);
   plan.symbols = symbolsOf(table);
@@ -572,6 +650,6 @@ if (result.success) {
   writeFileSync('debug_table.cpp', table, { flag: 'wx' });
   writeFileSync('debug_map.json', JSON.stringify(result.debugMap ?? {}), { flag: 'wx' });
 }
-plan.problems = plan.problems.map(inCharacters);
-plan.remarks = plan.remarks.map(inCharacters);
+plan.problems = plan.problems.map(inCharacters).map(inSource);
+plan.remarks = plan.remarks.map(inCharacters).map(inSource);
 writeFileSync('plan.json', JSON.stringify(plan), { flag: 'wx' });

@@ -49,10 +49,13 @@ TEST_F(ValuesOfTranslatedText, ByMatiecAreThoseOfTheStandard) {
       "TIME;\n"
       "many : TIME; later : DATE := D#2045-06-01; at1 : DT := DT#2040-01-01-00:00:01; day : TOD := "
       "TOD#23:59:58.001;\n"
-      "t1, t2, t3, t4, t5 : STRING; text : STRING := 'ABCDEF'; cycles : DINT;",
+      "t1, t2, t3, t4, t5 : STRING; text : STRING := 'ABCDEF'; found : INT;\n"
+      "bits : BYTE := 16#0F; more : WORD := 16#FF; narrow, wide : BOOL; cycles : DINT;",
       "sum := half + half; same := sum = T#1s; less := T#1s - T#1ms; many := T#900ms * 3;\n"
       "t1 := REPLACE('ABC', 'xyz', 1, 2); t2 := DELETE(text, 300, 3); t3 := MID(text, 300, 5);\n"
-      "t4 := INSERT(text, '-', 300); t5 := DELETE(text, 2, 0); cycles := cycles + 1;",
+      "t4 := INSERT(text, '-', 300); t5 := DELETE(text, 2, 0);\n"
+      "found := FIND('AABAAB', 'AB'); narrow := (NOT bits) = BYTE#16#F0; wide := NOT (more OR 16#1) > more;\n"
+      "cycles := cycles + 1;",
       "matiec");
   ASSERT_TRUE(end.success()) << end.output;
   InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
@@ -72,9 +75,70 @@ TEST_F(ValuesOfTranslatedText, ByMatiecAreThoseOfTheStandard) {
                                     {"t2", "'AB'"},
                                     {"t3", "'EF'"},
                                     {"t4", "'ABCDEF-'"},
-                                    {"t5", "''"}}) {
+                                    {"t5", "''"},
+                                    {"found", "2"},
+                                    {"narrow", "TRUE"},
+                                    {"wide", "TRUE"}}) {
     EXPECT_EQ(client.read(fmt::format("one.{}", name)), value) << name;
   }
+}
+
+TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const std::string text =
+      "TYPE Mode : (idle, busy); END_TYPE\n"
+      "FUNCTION_BLOCK Adder\nVAR_TEMP part : INT := 5; grid : ARRAY[0..1] OF INT; END_VAR\n"
+      "VAR_OUTPUT sum : INT; END_VAR\n"
+      "part := part + 1; grid[1] := grid[1] + part; sum := grid[1];\nEND_FUNCTION_BLOCK\n"
+      "PROGRAM Main\nVAR_EXTERNAL shared : INT; END_VAR\n"
+      "VAR t1 : STRING; text : STRING := 'ABCDE'; mode1 : Mode := Mode#busy; is_busy : BOOL; cycles : DINT;\n"
+      "adder1 : Adder; marker AT %MW3 : INT; again AT %MB6 : BYTE; END_VAR\nVAR_TEMP own : INT; END_VAR\n"
+      "t1 := INSERT(text, 'xy', 2); own := own + 1; shared := own;\n"
+      "CASE mode1 OF Mode#idle: is_busy := FALSE; Mode#busy: is_busy := TRUE; END_CASE;\n"
+      "adder1(); marker := 16#0102; cycles := cycles + 1;\nEND_PROGRAM\n"
+      "PROGRAM Reader\nVAR marker AT %MW3 : INT; copy : INT; END_VAR\ncopy := marker;\nEND_PROGRAM\n"
+      "CONFIGURATION cell RESOURCE press ON PLC\nVAR_GLOBAL shared : INT; END_VAR\n"
+      "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
+      "PROGRAM two WITH fast : Reader;\nEND_RESOURCE END_CONFIGURATION\n";
+  const auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", text), "-o",
+                                sandbox.folder() + "/values.so", "--compiler", "strucpp"},
+                               sandbox.folder());
+  ASSERT_TRUE(end && end->success()) << end->output;
+  InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
+  sut.wait_until_up();
+  ValueClient client(sandbox);
+  EXPECT_TRUE(eventually([&] {
+    const std::string cycles = client.read("one.cycles");
+    return cycles != "0" && cycles != "1" && client.read("two.copy") != "0";
+  }));
+  for (const auto& [name, value] : {std::pair{"one.t1", "'ABxyCDE'"},
+                                    {"one.is_busy", "TRUE"},
+                                    {"one.adder1.sum", "6"},
+                                    {"shared", "1"},
+                                    {"two.copy", "258"}}) {
+    EXPECT_EQ(client.read(name), value) << name;
+  }
+}
+
+TEST_F(ValuesOfTranslatedText, OfDatesThatStrucppDoesNotConvertAreRefused) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const ProgramEnd end = build("d : DATE; e : DATE; o : TOD; w : DT; t : TIME; s : STRING; b : BOOL;",
+                               "d := DT_TO_DATE(w); o := DATE_AND_TIME_TO_TOD(w);\nw := DATE_TO_DT(d);\nt := "
+                               "d - e;\nb := STRING_TO_BOOL(s);\n"
+                               "w := w + T#1h; o := o - T#1h; t := T#2s - T#1s; s := TIME_TO_STRING(t); d := "
+                               "STRING_TO_DATE(s); b := d = e;",
+                               "strucpp");
+  EXPECT_FALSE(end.success());
+  EXPECT_THAT(end.output, HasSubstr("values.st:5:6: DT_TO_DATE: STruC++ copies the number"));
+  EXPECT_THAT(end.output, HasSubstr("values.st:5:26: DATE_AND_TIME_TO_TOD: STruC++ copies the number"));
+  EXPECT_THAT(end.output, HasSubstr("values.st:6:6: DATE_TO_DT: STruC++ copies the number"));
+  EXPECT_THAT(end.output, HasSubstr("values.st:7:6: STruC++ counts days here"));
+  EXPECT_THAT(end.output, HasSubstr("values.st:8:6: STRING_TO_BOOL: STruC++ makes TRUE of each text"));
+  EXPECT_THAT(end.output,
+              HasSubstr("values.st:9:54: note: TIME_TO_STRING: STruC++ writes the number of nanoseconds"));
+  EXPECT_THAT(end.output, Not(HasSubstr("values.st:9:1: S")));
 }
 
 TEST_F(ValuesOfTranslatedText, ThatStrucppChangesAreRefusedAtTheirPlace) {

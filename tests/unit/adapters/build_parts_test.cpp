@@ -260,6 +260,29 @@ TEST_F(TranslatedByStrucpp, ACharacterThatIsNotExpectedIsToldAtItsPlace) {
       << "the offset is none of the source";
 }
 
+TEST_F(TranslatedByStrucpp, AnErrorWithoutAFileIsToldOfTheLastOneThatHasItsWord) {
+  const std::string one = put("one.st", "FUNCTION_BLOCK Pump\nEND_FUNCTION_BLOCK\n");
+  const std::string two = put("two.st", "FUNCTION_BLOCK pump\nEND_FUNCTION_BLOCK\n");
+  const std::string three = put("three.st", "FUNCTION_BLOCK Pumps\nEND_FUNCTION_BLOCK\n");
+  EXPECT_EQ(said({one, two, three},
+                 "return {success: false, warnings: [], errors: [{message: 'Duplicate function block "
+                 "declaration: PUMP', line: 1, column: 1}]};"),
+            two + ":1:1: Duplicate function block declaration: PUMP");
+}
+
+TEST_F(TranslatedByStrucpp, ItsTextHasNoPlacesOfProgramsAndOfOneResourceNoGlobals) {
+  const std::string one = put("one.st",
+                              "PROGRAM p VAR a AT %IX0.0 : BOOL; END_VAR END_PROGRAM CONFIGURATION c\n"
+                              "RESOURCE r ON PLC VAR_GLOBAL b : INT; END_VAR TASK t (X := 1); END_RESOURCE\n"
+                              "END_CONFIGURATION");
+  EXPECT_EQ(
+      said({one}, "return {success: false, warnings: [], errors: [{message: source, line: 2, column: 65}]};"),
+      one + ":2:47: PROGRAM p VAR a" + std::string(11, ' ') + ": BOOL; END_VAR END_PROGRAM CONFIGURATION c" +
+          std::string(19, ' ') +
+          "VAR_GLOBAL b : INT; END_VAR RESOURCE r ON PLC TASK t (X := 1); END_RESOURCE END_CONFIGURATION")
+      << "the column is that of the source";
+}
+
 TEST_F(TranslatedByStrucpp, ALetterThatIsNotAsciiIsToldAsItIsWritten) {
   const std::string one = put("one.st", "\n z\xC3\xA4hler := 1;\n");
   EXPECT_EQ(said({one},

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "instances/adapters/iec/task_plan.hpp"
 #include "tests/unit/adapters/problem_texts.hpp"
 
 namespace plchost::iec {
@@ -127,6 +128,21 @@ TEST(IecProject, SaysWhichTaskOfAProgramIsMissing) {
 TEST(IecProject, NamesTwoPousOfOneName) {
   EXPECT_THAT(problems_of("PROGRAM a END_PROGRAM\nFUNCTION_BLOCK A END_FUNCTION_BLOCK"),
               ElementsAre("a.st:2:1: there are two POUs 'A'"));
+}
+
+TEST(IecProject, WithTwoDeclarationsOfOneNameIsNotPlanned) {
+  const auto [project, problems] = read(
+      "TYPE Mode : (idle, busy); END_TYPE\nTYPE mode : INT; END_TYPE\n"
+      "FUNCTION_BLOCK MODE END_FUNCTION_BLOCK\nPROGRAM Main END_PROGRAM\n" +
+      in_resource("TASK t (INTERVAL := T#1s, PRIORITY := 1); PROGRAM p WITH t : Main;"));
+  ASSERT_THAT(problems, IsEmpty());
+  for (const Compiler compiler : {Compiler::matiec, Compiler::strucpp}) {
+    const Configuration& configuration = project.configurations.at(0);
+    const TaskPlan plan = plan_tasks(project, configuration, configuration.resources.at(0), compiler);
+    EXPECT_THAT(texts(plan.problems),
+                ElementsAre("a.st:2:6: 'mode' is the name of a TYPE, too: call one of them otherwise",
+                            "a.st:3:1: 'MODE' is the name of a TYPE, too: call one of them otherwise"));
+  }
 }
 
 TEST(IecProject, KnowsPersistentFromAVariableOfThatName) {

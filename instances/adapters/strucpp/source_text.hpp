@@ -1,0 +1,41 @@
+#pragma once
+
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/adapters/iec/project.hpp"
+
+namespace plchost::strucpp {
+
+/// A source as STruC++ gets it. All lines stay as they are.
+struct SourceText {
+  /// A place that a variable of a program has. The compiler lets no two variables have one, so it does not
+  /// see it.
+  struct HiddenPlace {
+    unsigned line;         ///< of the first name of the declaration
+    std::string name;      ///< that name, folded
+    std::string location;  ///< "%MW1"
+  };
+  struct Inserted {
+    unsigned line;
+    unsigned column;  ///< of the first character
+    unsigned characters;
+  };
+
+  std::string text;
+  std::vector<HiddenPlace> places;
+  std::vector<Inserted> inserted;
+};
+
+/// The enumerations that the sources declare, by their folded names.
+[[nodiscard]] std::set<std::string> enumerations_in(std::span<const iec::Source> sources);
+
+/// What the compiler knows in another form only becomes that form: Mode#busy, VAR_GLOBAL in a RESOURCE, and
+/// places that several programs have.
+[[nodiscard]] SourceText text_for_strucpp(const iec::Source& source,
+                                          const std::set<std::string>& enumerations);
+
+}  // namespace plchost::strucpp
