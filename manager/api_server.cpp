@@ -13,6 +13,7 @@
 #include "api/control/exit_codes.hpp"
 #include "manager/config/accounts.hpp"
 #include "manager/system/service_manager.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -125,6 +126,10 @@ std::vector<std::string> ApiServer::arguments() const {
   if (!config_.dds.user.empty()) {
     arguments.emplace_back("--user");
     arguments.push_back(config_.dds.user);
+  }
+  for (const uid_t user : users_of_instances()) {
+    arguments.emplace_back("--instance-user");
+    arguments.push_back(fmt::format("{}", user));
   }
   if (config_.dds.allow_unsecured) arguments.emplace_back("--allow-unsecured");
   if (!config_.dds.multicast) arguments.emplace_back("--no-multicast");

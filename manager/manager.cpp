@@ -27,6 +27,7 @@
 #include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/files/own_folder.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
@@ -54,6 +55,15 @@ Result<void> make_run_directory(const std::string& path) {
   // Locks, sockets and records in it are believed.
   if (auto ours = check_own_folder(path); !ours) return failure_in("[host] run_directory", ours.error());
   return {};
+}
+
+// In the folder nobody has a file but this user, root, and instances with a user of their own.
+Result<LockFile> take_lock(const std::string& path) {
+  auto lock = LockFile::take(path);
+  if (lock || lock.error().code != ErrorCode::refused) return lock;
+  spdlog::warn("{}; it is removed and not used", lock.error().describe());
+  PLCHOST_TRY(take_away(path));
+  return LockFile::take(path);
 }
 
 // The lock is by run directory; two managers with one pool would overwrite each other's pages all the same.
@@ -113,7 +123,7 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
 
 Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Options options) {
   PLCHOST_TRY(make_run_directory(config.host.run_directory));
-  auto lock = LockFile::take(config.host.run_directory + "/manager.lock");
+  auto lock = take_lock(config.host.run_directory + "/manager.lock");
   if (!lock && lock.error().code == ErrorCode::already_exists) {
     return failure_in("another manager runs with this run directory", lock.error());
   }
@@ -159,20 +169,78 @@ Result<void> Manager::check_state_folders() {
   return {};
 }
 
+// Also those of instances that run on from before another configuration.
+Result<void> Manager::find_instance_user() {
+  const HostConfig& host = config_.host;
+  std::vector<uid_t> users = users_in(host.run_directory);
+  if (!host.instance_user.empty()) {
+    auto found = find_user(host.instance_user);
+    if (!found) return failure_in("[host] instance_user", std::move(found).error());
+    instance_user_ = *std::move(found);
+    users.insert(users.begin(), instance_user_->number);
+  }
+  for (const uid_t user : users) {
+    if (!trust_instances_of(user))
+      spdlog::error("instances of user {} cannot be seen: {} other users are known", user,
+                    kMostInstanceUsers);
+  }
+  return {};
+}
+
+// Instances that lack something say so themselves; a disk that hangs keeps none from its start.
+void Manager::share_folders() {
+  const HostConfig& host = config_.host;
+  const auto shared = share_with_instances(host.run_directory, instance_user_);
+  if (!shared) spdlog::error("[host] run_directory: instances may lack it: {}", shared.error().describe());
+  const auto share = [folder = host.state_directory, user = instance_user_]() -> Result<void> {
+    std::error_code error;
+    if (user) std::filesystem::create_directories(folder, error);
+    if (!user && !std::filesystem::exists(folder, error)) return {};
+    return share_with_instances(folder, user);
+  };
+  const auto done = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
+  const auto& error = done ? *done : std::unexpected(done.error());
+  if (!error) spdlog::error("instances may lack [host] state_directory: {}", error.error().describe());
+}
+
+void Manager::prepare_files(const std::string& instance) {
+  const HostConfig& host = config_.host;
+  hand_over_files({.instance = instance, .pool = host.pool, .run_directory = host.run_directory},
+                  instance_user_);
+  if (!instance_user_) return;
+  const auto hand_over = [folder = host.state_directory, instance, user = instance_user_] {
+    hand_over_retain_files(folder, instance, user);
+    return true;
+  };
+  const auto done = state_disk_.ask<bool>(kStateLimit, "[host] state_directory", hand_over);
+  if (!done)
+    spdlog::error("instance {}: it may lack its retain files: {}", instance, done.error().describe());
+}
+
 bool Manager::server_has_own_user() const noexcept {
   return config_.dds.enabled && !config_.dds.user.empty();
 }
 
 // A server that lacks something says so itself; a disk that hangs keeps no instance from its start.
 void Manager::share_with_server() {
-  if (!server_has_own_user()) return;
+  if (!server_has_own_user() && !instance_user_) return;
   give_roots_files(config_.host.pool, ::getegid());
+  std::optional<gid_t> group;
+  if (server_has_own_user()) {
+    const auto server = find_user(config_.dds.user);
+    if (!server) return spdlog::error("[dds] user: {}", server.error().describe());
+    group = server->group;
+  }
   const std::string audit = audit_folder(config_.host);
   const std::string applications = applications_folder(config_.host.state_directory, config_.host.name);
-  const auto share = [audit, applications]() -> Result<void> {
-    for (const std::string& folder : {audit, audit + "/refused", audit + "/under_way"})
+  // The audit log is not for the manager's group: instances have it, too.
+  const auto share = [audit, applications, group]() -> Result<void> {
+    PLCHOST_TRY(share_folder(applications, GroupRight::reads));
+    if (!group) return keep_folder(audit);
+    PLCHOST_TRY(share_folder(audit, GroupRight::writes, group));
+    for (const std::string& folder : {audit + "/refused", audit + "/under_way"})
       PLCHOST_TRY(share_folder(folder, GroupRight::writes));
-    return share_folder(applications, GroupRight::reads);
+    return {};
   };
   const auto shared = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
   const auto& error = shared ? *shared : std::unexpected(shared.error());
@@ -182,6 +250,7 @@ void Manager::share_with_server() {
 Result<void> Manager::set_up() {
   const HostConfig& host = config_.host;
   if (auto free = check_pool_is_free(host.pool); !free) return free;
+  PLCHOST_TRY(find_instance_user());
   PLCHOST_TRY(check_state_folders());
   if (auto alone = lock_wishes(); !alone) return alone;
   PLCHOST_TRY(check_state_folders());  // one that somebody else has made meanwhile
@@ -192,7 +261,9 @@ Result<void> Manager::set_up() {
   PLCHOST_TRY_ASSIGN(const auto rights, pool_rights(host));
   const auto server = user_number(config_.dds.user);
   clear_names(host.pool, rights, server_has_own_user() && server ? std::optional(*server) : std::nullopt);
+  protect_managers_files(host.pool);
   share_with_server();
+  share_folders();  // last: what instances may not write is there by now
   if (auto ours = check_pool_owner(host.pool, rights); !ours) return ours;
   PLCHOST_TRY_ASSIGN(auto pool,
                      ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = rights}));
@@ -227,11 +298,12 @@ Result<void> Manager::set_up() {
 Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
   const HostConfig& own = config_.host;
   const std::string plc_instance = options_.programs + "/plc-instance";
-  auto host =
-      std::make_unique<ProcessHost>(*reactor_, ProcessHost::Settings{.program = plc_instance,
-                                                                     .name = instance.name,
-                                                                     .pool = own.pool,
-                                                                     .run_directory = own.run_directory});
+  auto host = std::make_unique<ProcessHost>(
+      *reactor_, ProcessHost::Settings{.program = plc_instance,
+                                       .name = instance.name,
+                                       .pool = own.pool,
+                                       .run_directory = own.run_directory,
+                                       .prepare = [this, name = instance.name] { prepare_files(name); }});
   ProcessHost& made = *host;
   auto applications = std::make_unique<StoreProcess>(
       *reactor_, state_disk_,
@@ -330,7 +402,7 @@ void Manager::tick() {
 
 void Manager::look_after_pool() {
   // An instance of a version before may have made a page anew.
-  if (server_has_own_user()) give_roots_files(config_.host.pool, ::getegid());
+  if (server_has_own_user() || instance_user_) give_roots_files(config_.host.pool, ::getegid());
   if (page_->keep()) {
     spdlog::warn("host page of pool '{}': another program has written over it; it is written anew",
                  config_.host.pool);

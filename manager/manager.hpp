@@ -18,6 +18,7 @@
 #include "manager/host_check/host_check_handler.hpp"
 #include "manager/store/wish_folder.hpp"
 #include "manager/store/wish_store.hpp"
+#include "manager/supervisor/instance_files.hpp"
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/disk_thread.hpp"
 #include "manager/system/reactor.hpp"
@@ -56,7 +57,10 @@ class Manager : private InstanceObserver {
   [[nodiscard]] Result<void> lock_wishes();
   [[nodiscard]] Result<void> check_state_folders();
   [[nodiscard]] bool server_has_own_user() const noexcept;
+  [[nodiscard]] Result<void> find_instance_user();
+  void share_folders();
   void share_with_server();
+  void prepare_files(const std::string& instance);
   void make_supervisor();
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
   void adopt_removed();
@@ -88,6 +92,7 @@ class Manager : private InstanceObserver {
   DiskThread config_disk_;  // of the configuration
   WishFolderLock wishes_lock_;
   std::unique_ptr<Reactor> reactor_;
+  InstanceUser instance_user_;
   std::optional<ObjectPool> pool_;
   std::optional<HostPageWriter> page_;
   HostStatus host_status_;

@@ -13,6 +13,7 @@
 #include "manager/manager.hpp"
 #include "manager/pool_rights.hpp"
 #include "manager/store/wish_memory.hpp"
+#include "manager/supervisor/instance_files.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
@@ -41,7 +42,7 @@ void Manager::adopt_removed() {
       spdlog::warn("instance {}: runs and is not in the configuration any more; it runs until it is stopped",
                    name);
     } else {
-      end_outputs(config_.host.pool, name);
+      end_outputs_of(config_.host.pool, name);
       wishes_.erase(name);
       transitions_.erase(name);
       remove_kept_settings(name);

@@ -13,6 +13,7 @@
 #include "manager/system/child_process.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
 
@@ -48,6 +49,8 @@ Result<ChildProcess> start_to_save(const ManagerConfig& config, const std::strin
   launch.pool = config.host.pool;
   launch.state_directory = config.host.state_directory;
   launch.log_level = config.host.log_level;
+  launch.user = config.host.instance_user;
+  launch.trusted_users = users_of_instances();
   auto arguments = to_arguments(plc_instance, launch);
   arguments.emplace_back(kSaveRetainOption);
   return spawn_process({.arguments = std::move(arguments)});

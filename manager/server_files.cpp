@@ -15,6 +15,7 @@
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/memory_rights.hpp"
+#include "shm/process/user_account.hpp"
 
 namespace plchost {
 
@@ -50,7 +51,7 @@ Result<void> share_entry(int folder, const char* name, const std::string& path, 
 
 Result<void> share(int folder, const std::string& path, GroupRight right, int depth) {
   constexpr int kDeepest = 3;
-  PLCHOST_TRY(give_rights(folder, {.group = ::getegid(), .mode = mode_of(true, right)}, path));
+  if (depth > 0) PLCHOST_TRY(give_rights(folder, {.group = ::getegid(), .mode = mode_of(true, right)}, path));
   if (depth == kDeepest) return {};
   const std::unique_ptr<DIR, EndFolder> entries(::fdopendir(::openat(folder, ".", kFolderFlags)));
   if (entries == nullptr) return failure(ErrorCode::system, "cannot read folder " + path, errno);
@@ -64,7 +65,7 @@ Result<void> share(int folder, const std::string& path, GroupRight right, int de
 
 }  // namespace
 
-Result<void> share_folder(const std::string& path, GroupRight right) {
+Result<void> share_folder(const std::string& path, GroupRight right, std::optional<gid_t> folders_group) {
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
   if (error) return failure(ErrorCode::system, "cannot make the folder of " + path, error.value());
@@ -72,7 +73,23 @@ Result<void> share_folder(const std::string& path, GroupRight right) {
     return failure(ErrorCode::system, "cannot create folder " + path, errno);
   const UniqueFd fd(::open(path.c_str(), kFolderFlags));
   if (!fd) return failure(ErrorCode::system, "cannot open folder " + path, errno);
+  const gid_t group = folders_group.value_or(::getegid());
+  {
+    const FilesAsUser in_that_group(::geteuid(), group);  // nobody else gives a file to a group
+    PLCHOST_TRY(give_rights(fd.get(), {.group = group, .mode = mode_of(true, right)}, path));
+  }
   return share(fd.get(), path, right, 0);
+}
+
+Result<void> keep_folder(const std::string& path) {
+  const UniqueFd fd(::open(path.c_str(), kFolderFlags));
+  if (!fd && errno == ENOENT) return {};
+  struct stat status{};
+  if (!fd || ::fstat(fd.get(), &status) != 0)
+    return failure(ErrorCode::system, "cannot open folder " + path, errno);
+  const mode_t kept = status.st_mode & 0755U;
+  PLCHOST_TRY(check_errno(::fchmod(fd.get(), kept), "cannot set the rights of " + path));
+  return {};
 }
 
 }  // namespace plchost

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <string>
+
+#include <sys/types.h>
 
 #include "shm/base/result.hpp"
 
@@ -12,7 +15,11 @@ enum class GroupRight : bool { reads, writes };
 /// Gives a folder, and what is in it, to the group of this process: that is how an API server with a user of
 /// its own reads or writes it. Makes the folder if it is not there. Files of other users stay as they are,
 /// and links are not followed: those who write there have fewer rights than this process. Not for others to
-/// read.
-[[nodiscard]] Result<void> share_folder(const std::string& path, GroupRight right);
+/// read. `folders_group`: that of the folder itself, which keeps all others of the manager's group out.
+[[nodiscard]] Result<void> share_folder(const std::string& path, GroupRight right,
+                                        std::optional<gid_t> folders_group = std::nullopt);
+
+/// Takes the right to write a folder from its group. It is well if there is none.
+[[nodiscard]] Result<void> keep_folder(const std::string& path);
 
 }  // namespace plchost

@@ -1,5 +1,6 @@
 #include <csignal>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -9,6 +10,7 @@
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/heap_trim.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 #include "shm/process/end_with_parent.hpp"
@@ -35,6 +37,7 @@ int main(int argc, char** argv) {
   options.pool = "plchost";
   std::string log_level = "info";
   std::string user;
+  std::vector<uid_t> instance_users;
   pid_t parent = 0;
   CLI::App app("plchost-dds: the API server of plchost, started by plchostd");
   app.set_version_flag("--version", PLCHOST_VERSION);
@@ -77,6 +80,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1U, 1024U));
   app.add_option("--user", user,
                  "run as this user, with no other rights than the API needs (default: that of the caller)");
+  app.add_option("--instance-user", instance_users, "numbers of the users that instances run as");
   app.add_option("--parent", parent, "be killed when this process ends, which has started this one")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
@@ -87,6 +91,7 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   plchost::start_log("plchost-dds", log_level);
+  for (const uid_t one : instance_users) plchost::trust_instances_of(one);
   options.own_user = !user.empty();
   if (options.own_user) {
     const auto become =

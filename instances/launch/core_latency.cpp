@@ -10,6 +10,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
@@ -42,6 +43,14 @@ std::optional<int> core_of_record(std::string_view name) {
   const auto [stopped, error] = std::from_chars(number.data(), number.data() + number.size(), core);
   const bool whole = error == std::errc() && stopped == number.data() + number.size() && core >= 0;
   return whole ? std::optional(core) : std::nullopt;
+}
+
+// What it says is written into the kernel's file. Where instances have a user of their own, that user can
+// make files in the run directory, too.
+bool is_own_or_roots(int record) {
+  struct stat status{};
+  return ::fstat(record, &status) == 0 && S_ISREG(status.st_mode) &&
+         (status.st_uid == 0 || status.st_uid == ::geteuid());
 }
 
 // The valid contents of the file: "n/a" or microseconds.
@@ -128,6 +137,8 @@ Result<UniqueFd> make_record(const std::string& run_directory, int core, const s
   constexpr mode_t kMode = 0640;
   UniqueFd record(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, kMode));
   if (!record) return failure(ErrorCode::refused, "cannot open " + path, errno);
+  if (!is_own_or_roots(record.get()))
+    return failure(ErrorCode::refused, path + " was put there by another user: remove it");
   PLCHOST_TRY_ASSIGN(const auto kept, read_text(record.get(), path));
   if (!is_latency(kept)) {
     if (::ftruncate(record.get(), 0) != 0 ||
@@ -189,8 +200,9 @@ Result<std::vector<std::string>> restore_core_latency(const std::string& sysfs,
     if (!entered) {
       PLCHOST_TRY_ASSIGN(entered, enter(run_directory));
     }
-    const UniqueFd record(::open(at->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
-    if (!record || ::flock(record.get(), LOCK_EX | LOCK_NB) != 0) continue;  // somebody holds it
+    const UniqueFd record(::open(at->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    if (!record || !is_own_or_roots(record.get()) || ::flock(record.get(), LOCK_EX | LOCK_NB) != 0)
+      continue;  // somebody holds it
     auto line = restore(sysfs, run_directory, *core, record.get());
     if (!line.empty()) done.push_back(std::move(line));
   }

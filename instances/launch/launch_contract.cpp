@@ -85,6 +85,8 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
   add("--pool", options.pool);
   if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
   if (!options.state_directory.empty()) add("--state-directory", options.state_directory);
+  if (!options.user.empty()) add("--user", options.user);
+  for (const unsigned user : options.trusted_users) add("--trusted-user", std::to_string(user));
   if (options.no_debug) arguments.emplace_back("--no-debug");
   if (options.stopped) arguments.emplace_back("--stopped");
   if (options.start_kind != StartKind::first) add("--start-kind", std::string(to_string(options.start_kind)));

@@ -37,8 +37,10 @@ struct LaunchOptions {
   std::string pool = "plchost";  ///< --pool NAME
   std::string run_directory;     ///< --run-directory DIR; empty: no control socket (by hand)
   std::string state_directory;  ///< --state-directory DIR: for what outlives a power cut; empty: nothing does
-  bool no_debug = false;        ///< --no-debug: an application that is a debug build is refused
-  bool stopped = false;         ///< --stopped: load the application, do not start it
+  std::string user;             ///< --user NAME or number; empty: that of the caller
+  std::vector<unsigned> trusted_users;      ///< --trusted-user N: their pages are those of instances, too
+  bool no_debug = false;                    ///< --no-debug: an application that is a debug build is refused
+  bool stopped = false;                     ///< --stopped: load the application, do not start it
   StartKind start_kind = StartKind::first;  ///< --start-kind first|warm|cold|after-fault
   int report_fd = -1;              ///< --report-fd N: where SetupReports go; -1: standard error, as text
   std::string log_level = "info";  ///< --log-level

@@ -16,9 +16,11 @@
 #include "instances/runtime/memory/retain_keeper.hpp"
 #include "instances/runtime/settings/read_settings.hpp"
 #include "instances/runtime/setup/options.hpp"
+#include "instances/runtime/setup/own_user.hpp"
 #include "instances/runtime/trial/trial.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
 #include "shm/process/capabilities.hpp"
@@ -106,19 +108,27 @@ int refuse_start(const Options& options, const Error& error) {
   return kExitSetupFailed;
 }
 
-// As a service the manager has these for the API server. By hand a process keeps what it was given.
-Result<void> give_up_managers_rights() {
-  if (!never_gains_rights()) return {};
+// As a service the manager has these for its children. By hand a process keeps what it was given. One that is
+// to be another user gives up all of its rights later.
+Result<void> give_up_managers_rights(const Options& options) {
+  if (!never_gains_rights() || !options.launch.user.empty()) return {};
   return give_up_capabilities({CAP_SETGID, CAP_SETUID});
 }
 
 int run(const Options& options) {
-  if (const auto given_up = give_up_managers_rights(); !given_up)
+  if (const auto given_up = give_up_managers_rights(options); !given_up)
     return refuse_start(options, given_up.error());
+  for (const unsigned user : options.launch.trusted_users) trust_instances_of(user);
   if (!options.check_settings.empty()) return check_settings(options.check_settings);
   start_log("plc-instance/" + options.launch.name, options.launch.log_level);
   const auto signals = take_signals();
   if (!signals) return refuse_start(options, signals.error());
+  // An instance itself does that when it has read its settings: idle states are root's to hold.
+  const bool helps = !options.check_application.empty() || options.save_retain;
+  if (helps && !options.launch.user.empty()) {
+    const auto become = become_user_of_instances(options.launch.user, options.launch.pool);
+    if (!become) return refuse_start(options, failure_in("--user", become.error()).error());
+  }
   if (!options.check_application.empty()) {
     // SIGTERM and not SIGKILL: processes that the application has forked end, too.
     if (options.parent != 0 && !end_with_parent(options.parent, SIGTERM)) return kExitSetupFailed;

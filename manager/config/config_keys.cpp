@@ -105,6 +105,14 @@ constexpr std::array kHostKeys = {
          .meaning = "permission bits of the pool; also of its memories where nothing else is said. A pool "
                     "that is there already gets these rights, too, and the log says so; processes that have "
                     "it mapped keep it"}),
+    host<&HostConfig::instance_user, TextKey<OwnUserRule>>(
+        {.name = "instance_user",
+         .when = next_manager,
+         .why = "folders and pages of its instances get that user's rights at its start",
+         .initial = "the user that starts the manager",
+         .meaning =
+             "user of the instances, see [Rights](install.md#rights). Another one needs a manager that "
+             "is root; the manager's group is theirs, too"}),
     host<&HostConfig::cores, CoresKey>({.name = "cores",
                                         .when = at_once,
                                         .initial = "the kernel's isolated cores, else all",

@@ -27,7 +27,9 @@ struct HostConfig {
   std::string pool_owner;   ///< user's name or number; empty: the user that starts the manager
   std::string pool_group;   ///< group's name or number; empty: that of the user that starts the manager
   mode_t pool_mode = 0660;  ///< permission bits of the pool and, where nothing else is said, of its memories
-  std::vector<int> cores;   ///< where instances may run
+  std::string
+      instance_user;       ///< name or number of the user that instances run as; empty: that of the manager
+  std::vector<int> cores;  ///< where instances may run
   std::vector<int> housekeeping_cores;       ///< where the manager and the API server run
   std::string read_variables = "engineer";   ///< the role that may, of a secured host
   std::string write_variables = "engineer";  ///< the same, also to force

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "shm/files/memory_rights.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -14,6 +15,11 @@ namespace {
 
 // So that one busy peer leaves room for the others in each round.
 constexpr int kPacketsPerRound = 16;
+
+// They have the group of the manager, as the API server has.
+bool is_of_an_instance(uid_t user) {
+  return !is_own_or_roots(user) && is_trusted_owner(user);
+}
 
 }  // namespace
 
@@ -50,6 +56,8 @@ void CommandServer::accept() {
     return;
   }
   if (!*socket) return;
+  if (const auto user = (*socket)->peer_user(); !user || is_of_an_instance(*user))
+    return spdlog::warn("control socket: an instance, or a program that it has started, is refused");
   if (connections_.size() >= kMaxConnections) {
     (void)(*socket)->send(encode(ControlReply{
         .number = 0,

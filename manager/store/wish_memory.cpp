@@ -24,6 +24,9 @@ std::string wish_memory_name(std::string_view pool, std::string_view instance) {
   return fmt::format("{}.wish.{}", pool, instance);
 }
 
+// The manager alone writes and reads it.
+const PageRights kWishRights{.owners = is_own_or_roots, .memory = {.mode = 0600}};
+
 // A file that another user has put there in the place of none was never a wish.
 bool is_damaged(const Error& error) noexcept {
   return error.code != ErrorCode::not_found && error.code != ErrorCode::refused &&
@@ -50,7 +53,8 @@ WishMemory::Layout& WishMemory::layout() const noexcept {
 
 Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view instance) {
   const std::string name = wish_memory_name(pool, instance);
-  const auto before = open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_only);
+  const auto before =
+      open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_only, kWishRights.owners);
   const bool damaged = !before && is_damaged(before.error());
   // For the managers to come: something was written, and none of it is whole.
   const auto mark = [damaged](Layout& page) {
@@ -58,7 +62,7 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
     page.places[0].generation = 1;
     page.places[0].length = std::numeric_limits<std::uint64_t>::max();
   };
-  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything, mark);
+  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything, mark, kWishRights);
   if (!memory && damaged) return failure(ErrorCode::corrupt, memory.error().describe());
   if (!memory) return std::unexpected(std::move(memory).error());
   WishMemory opened(name, *std::move(memory));
@@ -141,7 +145,8 @@ Result<bool> WishMemory::mend() {
   const bool headed = is_described(layout(), kWishKind);
   if (headed && holds(0) && holds(1)) return false;
   if (memory_.lost()) {  // it has been looked at
-    PLCHOST_TRY_ASSIGN(memory_, MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind)));
+    PLCHOST_TRY_ASSIGN(
+        memory_, MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind), kWishRights.memory));
   }
   const std::size_t whole = holds(0) ? 0 : 1;
   fill(1 - whole);

@@ -8,6 +8,7 @@
 
 #include "shm/base/time.hpp"
 #include "shm/base/transient.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/log/log.hpp"
 #include "shm/operations/operations.hpp"
 
@@ -221,6 +222,8 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
   options.run_directory = surroundings_.host.run_directory;
   options.state_directory = surroundings_.host.state_directory;
   options.start_kind = start_kind_;
+  options.user = surroundings_.host.instance_user;
+  options.trusted_users = users_of_instances();
   options.no_debug = !surroundings_.host.allow_debug;
   options.stopped = next == Next::stay_stopped;
   options.report_fd = kChildReportFd;

@@ -6,12 +6,12 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "manager/supervisor/instance_files.hpp"
 #include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
-#include "shm/pages/outputs_page.hpp"
 
 namespace plchost {
 
@@ -23,6 +23,7 @@ ProcessHost::ProcessHost(Reactor& reactor, Settings settings)
       check_timer_(reactor, [this] { check_timed_out(); }) {}
 
 Result<int> ProcessHost::spawn(const LaunchOptions& options) {
+  if (settings_.prepare) settings_.prepare();
   PLCHOST_TRY_ASSIGN(auto channel, make_report_channel());
   const auto output = output_.open_for_process();
   if (!output) {  // better a PLC whose words are not kept than none
@@ -59,6 +60,11 @@ Result<int> ProcessHost::adopt_peer() {
   PLCHOST_TRY_ASSIGN(auto process, open_process(pid));
   // Looked at again: had it ended before, its number could mean another process by now.
   if (link_.is_cut()) return failure(ErrorCode::unavailable, fmt::format("process {} has ended", pid));
+  // A process could have given its socket to another one and ended; its number may be a stranger's by now.
+  PLCHOST_TRY_ASSIGN(const auto user, link_.peer_user());
+  if (user_of_process(pid) != user)
+    return failure(ErrorCode::refused,
+                   fmt::format("process {} is not of user {}, as its socket is", pid, user));
   PLCHOST_TRY(follow(process));
   output_.adopt();
   output_.say(LogLevel::info, pid, fmt::format("a new manager has adopted process {}", pid));
@@ -205,7 +211,7 @@ std::optional<InstanceRuntime> ProcessHost::left_runtime() const {
 }
 
 void ProcessHost::end_outputs() {
-  plchost::end_outputs(settings_.pool, settings_.name);
+  end_outputs_of(settings_.pool, settings_.name);
   DebugPage::remove(settings_.pool, settings_.name);  // nothing halts there any more
 }
 

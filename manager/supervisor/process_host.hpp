@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ class ProcessHost : public InstanceHost {
     std::string name;
     std::string pool;
     std::string run_directory;
+    /// Before each start of a process; may be empty.
+    std::function<void()> prepare = {};
   };
 
   ProcessHost(Reactor& reactor, Settings settings);

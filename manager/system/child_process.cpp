@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <optional>
 #include <set>
 
 #include <fcntl.h>
@@ -20,6 +23,7 @@
 #include "shm/base/process_start.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/files/memory_rights.hpp"
 
 namespace plchost {
 
@@ -66,6 +70,59 @@ Result<void> prepare(SpawnActions& actions, const SpawnRequest& request) {
   constexpr int kFlags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSID;
   if (error == 0) error = posix_spawnattr_setflags(&actions.attributes, static_cast<short>(kFlags));
   return check_returned(error, "cannot prepare to start " + request.arguments.front());
+}
+
+constexpr auto kSameUser = static_cast<uid_t>(-1);
+
+/// As long as this exists, the thread may signal the processes of that user. For that root needs no CAP_KILL,
+/// only CAP_SETUID. The system calls and not the functions: those would change all threads.
+class SignalsAsUser {
+ public:
+  explicit SignalsAsUser(uid_t user) noexcept
+      : own_(::geteuid()), dumpable_(::prctl(PR_GET_DUMPABLE, 0, 0, 0, 0)) {
+    can_ = ::syscall(SYS_setresuid, kSameUser, user, kSameUser) == 0;
+  }
+  ~SignalsAsUser() { (void)back(); }
+  SignalsAsUser(const SignalsAsUser&) = delete;
+  SignalsAsUser& operator=(const SignalsAsUser&) = delete;
+  [[nodiscard]] bool can() const noexcept { return can_; }
+  [[nodiscard]] Result<void> back() noexcept {
+    if (!can_) return {};
+    can_ = false;
+    PLCHOST_TRY(
+        check_errno(::syscall(SYS_setresuid, kSameUser, own_, kSameUser), "cannot be the own user again"));
+    if (dumpable_ == 1) (void)::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0);  // each change of the user clears it
+    return {};
+  }
+
+ private:
+  uid_t own_;
+  int dumpable_;
+  bool can_ = false;
+};
+
+// Nothing: it is no process of a user that only instances have.
+std::optional<uid_t> user_of_instance(pid_t pid) {
+  if (::geteuid() != 0) return std::nullopt;
+  const auto user = user_of_process(pid);
+  return user && *user != 0 && is_trusted_owner(*user) ? user : std::nullopt;
+}
+
+Result<void> send_signal(const ChildProcess& process, int signal) {
+  const long sent = ::syscall(SYS_pidfd_send_signal, process.pidfd.get(), signal, nullptr, 0);
+  if (sent != 0 && errno == ESRCH) return {};
+  PLCHOST_TRY(check_errno(sent, fmt::format("cannot signal {} to process {}", signal, process.pid)));
+  return {};
+}
+
+void kill_group(pid_t leader) noexcept {
+  const auto user = user_of_instance(leader);
+  if (!user) {
+    ::kill(-leader, SIGKILL);
+    return;
+  }
+  const SignalsAsUser rights(*user);
+  ::kill(-leader, SIGKILL);
 }
 
 // The number of the session stays that of its leader while anybody is in it.
@@ -134,7 +191,7 @@ void end_session(const ChildProcess& leader) noexcept {
   const int waited =
       ::waitid(P_PIDFD, static_cast<id_t>(leader.pidfd.get()), &info, WEXITED | WNOHANG | WNOWAIT);
   if (waited == 0 && info.si_pid == leader.pid) {
-    ::kill(-leader.pid, SIGKILL);
+    kill_group(leader.pid);
     return kill_session(leader.pid);
   }
   // Another's child: if a younger process has the number by now, it may lead a session of its own.
@@ -149,23 +206,19 @@ void kill_and_reap(const ChildProcess& process) noexcept {
 }
 
 Result<void> signal_process(const ChildProcess& process, int signal) {
-  const long sent = ::syscall(SYS_pidfd_send_signal, process.pidfd.get(), signal, nullptr, 0);
-  if (sent != 0 && errno == ESRCH) return {};
-  PLCHOST_TRY(check_errno(sent, fmt::format("cannot signal {} to process {}", signal, process.pid)));
-  return {};
+  auto sent = send_signal(process, signal);
+  if (sent || sent.error().system_errno != EPERM) return sent;
+  const auto user = user_of_instance(process.pid);
+  return user ? signal_process_of(*user, process, signal) : sent;
 }
 
-// The system calls and not the functions: those would change all threads.
 Result<void> signal_process_of(uid_t user, const ChildProcess& process, int signal) {
-  auto sent = signal_process(process, signal);
+  auto sent = send_signal(process, signal);
   if (sent || sent.error().system_errno != EPERM) return sent;
-  constexpr auto kSame = static_cast<uid_t>(-1);
-  const uid_t own = ::geteuid();
-  const int dumpable = ::prctl(PR_GET_DUMPABLE, 0, 0, 0, 0);
-  if (::syscall(SYS_setresuid, kSame, user, kSame) != 0) return sent;
-  sent = signal_process(process, signal);
-  PLCHOST_TRY(check_errno(::syscall(SYS_setresuid, kSame, own, kSame), "cannot be the own user again"));
-  if (dumpable == 1) (void)::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0);  // each change of the user clears it
+  SignalsAsUser rights(user);
+  if (!rights.can()) return sent;
+  sent = send_signal(process, signal);
+  PLCHOST_TRY(rights.back());
   return sent;
 }
 
@@ -197,6 +250,20 @@ std::string read_available(int fd, std::size_t most) {
   }
   text.resize(length);
   return text;
+}
+
+std::optional<uid_t> user_of_process(pid_t pid) {
+  std::ifstream status(fmt::format("/proc/{}/status", pid));
+  constexpr std::string_view kField = "Uid:";
+  for (std::string line; std::getline(status, line);) {
+    if (!line.starts_with(kField)) continue;
+    const std::size_t begin = line.find_first_not_of("\t ", kField.size());
+    uid_t user = 0;
+    if (begin == std::string::npos) return std::nullopt;
+    const auto [end, error] = std::from_chars(line.data() + begin, line.data() + line.size(), user);
+    return error == std::errc() ? std::optional(user) : std::nullopt;
+  }
+  return std::nullopt;
 }
 
 std::vector<int> cores_of_process(pid_t pid) {

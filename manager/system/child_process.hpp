@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,7 +56,7 @@ struct SpawnRequest {
 /// process group and in its session.
 void end_session(const ChildProcess& leader) noexcept;
 
-/// A process that is gone already is no error.
+/// A process that is gone already is no error. Also of one that runs as a user of instances.
 [[nodiscard]] Result<void> signal_process(const ChildProcess& process, int signal);
 
 /// The same of a process that has become another user's. For that root needs no CAP_KILL, only CAP_SETUID.
@@ -77,6 +78,9 @@ struct OutputPipe {
 [[nodiscard]] Result<OutputPipe> make_output_pipe();
 /// The data that can be read now, up to `most` bytes.
 [[nodiscard]] std::string read_available(int fd, std::size_t most);
+
+/// Nothing: there is no such process.
+[[nodiscard]] std::optional<uid_t> user_of_process(pid_t pid);
 
 /// The union of the cores that the threads of a process may run on, ascending.
 [[nodiscard]] std::vector<int> cores_of_process(pid_t pid);

@@ -33,9 +33,10 @@ template <class Layout>
 /// Opens a page whose layout begins with magic and version, and checks the magic. Of open_page().
 template <class Layout>
 [[nodiscard]] Result<MemoryFile> open_of_magic(const std::string& name, const PageKind& kind,
-                                               MemoryFile::Access access) {
+                                               MemoryFile::Access access,
+                                               const OwnerCheck& owners = is_trusted_owner) {
   static_assert(offsetof(Layout, magic) == 0 && offsetof(Layout, version) == 8);
-  auto memory = MemoryFile::open(name, sizeof(Layout), access);
+  auto memory = MemoryFile::open(name, sizeof(Layout), access, owners);
   if (!memory) return memory;
   // The name is given to complete pages only, so the magic is there from the start.
   if (reinterpret_cast<const Layout*>(memory->bytes().data())->magic == kind.magic) return memory;
@@ -59,8 +60,9 @@ template <class Layout>
 /// The same of a layout that has one size and says it in `size`.
 template <class Layout>
 [[nodiscard]] Result<MemoryFile> open_fixed_page(const std::string& name, const PageKind& kind,
-                                                 MemoryFile::Access access) {
-  auto memory = open_of_magic<Layout>(name, kind, access);
+                                                 MemoryFile::Access access,
+                                                 const OwnerCheck& owners = is_trusted_owner) {
+  auto memory = open_of_magic<Layout>(name, kind, access, owners);
   if (!memory) return memory;
   const Layout& page = *reinterpret_cast<const Layout*>(memory->bytes().data());
   if (!is_described(page, kind) || memory->bytes().size() != sizeof(Layout)) {
@@ -95,17 +97,27 @@ template <class Layout, class Begin = void (*)(Layout&)>
   };
 }
 
+/// The owners that a page may have, and the rights to one that is made.
+struct PageRights {
+  OwnerCheck owners = is_trusted_owner;
+  MemoryRights memory = {};
+};
+/// Of a page that the manager alone writes: no instance has it by its user or its group.
+inline const PageRights kManagersPage{.owners = is_own_or_roots, .memory = {.mode = 0640}};
+
 /// Opens the page of that name, or makes a new one, to write to it. `kind` is a constant of the program.
 template <class Layout, class Begin = void (*)(Layout&)>
 [[nodiscard]] Result<MemoryFile> open_or_make_page(const std::string& name, const PageKind& kind,
-                                                   Replaces replaces, Begin begin = leave_empty<Layout>) {
+                                                   Replaces replaces, Begin begin = leave_empty<Layout>,
+                                                   const PageRights& rights = {}) {
   const auto make = [&](bool replace) {
     const auto fill = new_page<Layout>(kind, begin);
-    return replace ? MemoryFile::replace(name, sizeof(Layout), fill)
-                   : MemoryFile::create(name, sizeof(Layout), fill);
+    return replace ? MemoryFile::replace(name, sizeof(Layout), fill, rights.memory)
+                   : MemoryFile::create(name, sizeof(Layout), fill, rights.memory);
   };
-  return open_or_make([&] { return open_fixed_page<Layout>(name, kind, MemoryFile::Access::read_write); },
-                      make, replaces);
+  return open_or_make(
+      [&] { return open_fixed_page<Layout>(name, kind, MemoryFile::Access::read_write, rights.owners); },
+      make, replaces);
 }
 
 }  // namespace plchost

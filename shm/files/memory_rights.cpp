@@ -1,6 +1,8 @@
 #include "shm/files/memory_rights.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <vector>
 
@@ -38,10 +40,40 @@ bool is_member(uid_t user, gid_t group) {
 constexpr mode_t kRead = 4;
 constexpr mode_t kWrite = 2;
 
+std::array<std::atomic<uid_t>, kMostInstanceUsers> instance_users{};
+
+bool is_of_instances(uid_t user) noexcept {
+  return user != 0 && std::ranges::any_of(instance_users, [user](const std::atomic<uid_t>& known) {
+           return known.load(std::memory_order_relaxed) == user;
+         });
+}
+
 }  // namespace
 
-bool is_trusted_owner(uid_t owner) noexcept {
+bool is_own_or_roots(uid_t owner) noexcept {
   return owner == 0 || owner == ::geteuid();
+}
+
+bool is_trusted_owner(uid_t owner) noexcept {
+  return is_own_or_roots(owner) || is_of_instances(owner);
+}
+
+// 0 is an empty place: root needs none.
+bool trust_instances_of(uid_t user) noexcept {
+  if (user == 0 || is_of_instances(user)) return true;
+  for (std::atomic<uid_t>& place : instance_users) {
+    uid_t empty = 0;
+    if (place.compare_exchange_strong(empty, user)) return true;
+  }
+  return false;
+}
+
+std::vector<uid_t> users_of_instances() {
+  std::vector<uid_t> users;
+  for (const std::atomic<uid_t>& place : instance_users) {
+    if (const uid_t user = place.load(); user != 0) users.push_back(user);
+  }
+  return users;
 }
 
 bool is_any_owner(uid_t /*owner*/) noexcept {

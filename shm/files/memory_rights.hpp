@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <sys/stat.h>
 #include <sys/types.h>
@@ -22,7 +24,14 @@ struct MemoryRights {
 /// taken.
 using OwnerCheck = std::function<bool(uid_t owner)>;
 /// root, and the user of the calling process: those who could do all that this process does anyway.
+[[nodiscard]] bool is_own_or_roots(uid_t owner) noexcept;
+/// The same, and the users of instances: their pages are read, and no more than that follows from them.
 [[nodiscard]] bool is_trusted_owner(uid_t owner) noexcept;
+/// From now on this process takes the pages of instances from that user, too. At most kMostInstanceUsers:
+/// the configured one, and those of instances that run since before it. False: there are so many. Set-up.
+bool trust_instances_of(uid_t user) noexcept;
+inline constexpr std::size_t kMostInstanceUsers = 8;
+[[nodiscard]] std::vector<uid_t> users_of_instances();
 /// For a client that joins what another user has set up: the files of a host belong to the user that runs it.
 [[nodiscard]] bool is_any_owner(uid_t owner) noexcept;
 

@@ -76,7 +76,11 @@ void remove_pool_memories(std::string_view pool, std::span<const std::string> ke
 bool may_write_pool(std::string_view pool, uid_t user) {
   struct stat status{};
   if (::stat(MemoryFile::path(pool).c_str(), &status) != 0) return false;
-  return user == ::geteuid() ||
+  // The pool's group is theirs also where no account says so.
+  const auto of_instances = users_of_instances();
+  const bool by_group =
+      (status.st_mode & S_IWGRP) != 0 && std::ranges::find(of_instances, user) != of_instances.end();
+  return user == ::geteuid() || by_group ||
          allows_to_write({.owner = status.st_uid, .group = status.st_gid, .mode = status.st_mode}, user);
 }
 

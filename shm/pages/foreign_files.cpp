@@ -22,32 +22,34 @@ namespace plchost {
 namespace {
 
 /// The users that a file may belong to.
-enum class Owners : std::uint8_t { trusted, writers_of_pool, api_server };
+enum class Owners : std::uint8_t { manager, instances, writers_of_pool, api_server };
 
 // Nothing: the name is none of this host's.
 std::optional<Owners> owners_of(std::string_view pool, const std::string& file) {
   if (const auto memory = memory_of_file(pool, file)) {
     constexpr std::string_view kOfInstances = ".retain";
-    return memory->ends_with(kOfInstances) ? Owners::trusted : Owners::writers_of_pool;
+    return memory->ends_with(kOfInstances) ? Owners::instances : Owners::writers_of_pool;
   }
   const std::string downloads = fmt::format("{}.download.", pool);
   if (file == fmt::format("{}.posts", pool) || file.starts_with(downloads)) return Owners::api_server;
-  const std::array names = {std::string(pool), host_page_name(pool)};
-  const std::array beginnings = {instance_page_name(pool, ""),   instance_claim_name(pool, ""),
-                                 transition_ring_name(pool, ""), log_ring_name(pool, ""),
-                                 fmt::format("{}.wish.", pool),  fmt::format("{}.variables.", pool),
-                                 outputs_page_name(pool, ""),    fmt::format("{}.debug.", pool)};
-  const bool ours =
-      std::ranges::find(names, file) != names.end() ||
-      std::ranges::any_of(beginnings, [&](const auto& begin) { return file.starts_with(begin); });
-  return ours ? std::optional(Owners::trusted) : std::nullopt;
+  const auto begins = [&](const std::string& begin) { return file.starts_with(begin); };
+  const std::array of_manager = {transition_ring_name(pool, ""), log_ring_name(pool, ""),
+                                 fmt::format("{}.wish.", pool)};
+  if (file == pool || file == host_page_name(pool) || std::ranges::any_of(of_manager, begins)) {
+    return Owners::manager;
+  }
+  const std::array of_instances = {instance_page_name(pool, ""), instance_claim_name(pool, ""),
+                                   fmt::format("{}.variables.", pool), outputs_page_name(pool, ""),
+                                   fmt::format("{}.debug.", pool)};
+  return std::ranges::any_of(of_instances, begins) ? std::optional(Owners::instances) : std::nullopt;
 }
 
 bool belongs(const struct stat& status, Owners owners, const MemoryRights& rights,
              std::optional<uid_t> api_server) {
   if (!S_ISREG(status.st_mode)) return false;
   if (owners == Owners::api_server && status.st_uid == api_server) return true;
-  if (is_trusted_owner(status.st_uid) || status.st_uid == rights.owner) return true;
+  if (is_own_or_roots(status.st_uid) || status.st_uid == rights.owner) return true;
+  if (owners != Owners::manager && is_trusted_owner(status.st_uid)) return true;
   // Only a member of a group can give a file to it.
   const bool of_group = status.st_gid == rights.group.value_or(::getegid()) && (rights.mode & S_IWGRP) != 0;
   return owners == Owners::writers_of_pool && (of_group || allows_to_write(rights, status.st_uid));
@@ -71,6 +73,23 @@ std::vector<ForeignFile> take_away_foreign_files(std::string_view pool, const Me
   }
   for (ForeignFile& file : found) file.taken_away = take_away(file.path);
   return found;
+}
+
+void protect_managers_files(std::string_view pool) noexcept {
+  constexpr mode_t kPermissions = 07777;
+  const std::string wishes = fmt::format("{}.wish.", pool);
+  const std::string logs = log_ring_name(pool, "");
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string file = at->path().filename().string();
+    const bool read_by_others = file == host_page_name(pool) || file.starts_with(logs);
+    struct stat status{};
+    if ((!read_by_others && !file.starts_with(wishes)) || ::lstat(at->path().c_str(), &status) != 0) continue;
+    const mode_t mode = read_by_others ? 0640 : 0600;
+    const bool own = S_ISREG(status.st_mode) && status.st_uid == ::geteuid();
+    if (own && (status.st_mode & kPermissions) != mode) (void)::chmod(at->path().c_str(), mode);
+  }
 }
 
 void give_roots_files(std::string_view pool, gid_t group) noexcept {

@@ -27,6 +27,10 @@ struct ForeignFile {
 [[nodiscard]] std::vector<ForeignFile> take_away_foreign_files(
     std::string_view pool, const MemoryRights& rights, std::optional<uid_t> api_server = std::nullopt);
 
+/// Takes the right to write the pages that the manager alone writes from the group, and that to its wishes
+/// altogether. A manager of a version before has made them. Set-up.
+void protect_managers_files(std::string_view pool) noexcept;
+
 /// Gives the pool's files that belong to this user and to root's group to `group`. A manager before this one
 /// had root's group, and its processes have made them. Set-up, and any soft thread later.
 void give_roots_files(std::string_view pool, gid_t group) noexcept;

@@ -89,7 +89,9 @@ std::string host_page_name(std::string_view pool) {
 
 Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
   const std::string name = host_page_name(pool);
-  PLCHOST_TRY_ASSIGN(auto memory, open_or_make_page<HostPageLayout>(name, kHostPageKind, Replaces::anything));
+  PLCHOST_TRY_ASSIGN(auto memory,
+                     open_or_make_page<HostPageLayout>(name, kHostPageKind, Replaces::anything,
+                                                       leave_empty<HostPageLayout>, kManagersPage));
   HostPageLayout& page = host_layout_of(memory);  // of a manager that ended while it wrote, perhaps
   page.host.recover();
   for (auto& instance : page.instances) instance.recover();
@@ -132,7 +134,8 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
 
 bool HostPageWriter::keep() {
   if (!holds(host_layout_of(memory_).host, host_) && memory_.lost()) {
-    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), new_page<HostPageLayout>(kHostPageKind));
+    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), new_page<HostPageLayout>(kHostPageKind),
+                                     kManagersPage.memory);
     if (!fresh) return true;
     memory_ = std::move(*fresh);
   }
@@ -154,8 +157,8 @@ bool HostPageWriter::keep() {
 }
 
 Result<HostPageReader> HostPageReader::open(std::string_view pool) {
-  auto memory =
-      open_fixed_page<HostPageLayout>(host_page_name(pool), kHostPageKind, MemoryFile::Access::read_only);
+  auto memory = open_fixed_page<HostPageLayout>(host_page_name(pool), kHostPageKind,
+                                                MemoryFile::Access::read_only, is_own_or_roots);
   if (!memory) return std::unexpected(memory.error());
   return HostPageReader(std::move(*memory));
 }

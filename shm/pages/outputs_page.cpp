@@ -150,7 +150,7 @@ Result<OutputsPage> OutputsPage::create(std::string_view pool, std::string_view 
                                           fill_outputs(bytes, outputs);
                                           return {};
                                         },
-                                        {.mode = 0600});
+                                        {.mode = 0640});
   if (!made) return std::unexpected(made.error());
   return OutputsPage(name);
 }

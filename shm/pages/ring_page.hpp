@@ -38,13 +38,13 @@ class RingPage {
   static constexpr std::uint64_t kMaxSequence = std::numeric_limits<std::int64_t>::max();
 
   /// Continues the ring that is there, or makes one in the place of whatever has its name. Set-up.
-  [[nodiscard]] static Result<RingPage> open(const std::string& name) {
-    auto ring = of(open_or_make_page<Layout>(name, Kind, Replaces::anything, begin));
-    return ring && ring->last() > kMaxSequence ? renew(name) : std::move(ring);
+  [[nodiscard]] static Result<RingPage> open(const std::string& name, const PageRights& rights = {}) {
+    auto ring = of(open_or_make_page<Layout>(name, Kind, Replaces::anything, begin, rights));
+    return ring && ring->last() > kMaxSequence ? renew(name, rights) : std::move(ring);
   }
   /// A new ring in the place of the one of that name. Set-up.
-  [[nodiscard]] static Result<RingPage> renew(const std::string& name) {
-    return of(MemoryFile::replace(name, sizeof(Layout), new_page<Layout>(Kind, begin)));
+  [[nodiscard]] static Result<RingPage> renew(const std::string& name, const PageRights& rights = {}) {
+    return of(MemoryFile::replace(name, sizeof(Layout), new_page<Layout>(Kind, begin), rights.memory));
   }
   /// not_found: there is none yet. corrupt: not such a ring. Set-up.
   [[nodiscard]] static Result<RingPage> open_to_read(const std::string& name) {

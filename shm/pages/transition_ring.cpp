@@ -25,7 +25,8 @@ std::string transition_ring_name(std::string_view pool, std::string_view instanc
 }
 
 Result<TransitionRing> TransitionRing::open(std::string_view pool, std::string_view instance) {
-  PLCHOST_TRY_ASSIGN(auto page, TransitionRingPage::open(transition_ring_name(pool, instance)));
+  PLCHOST_TRY_ASSIGN(
+      auto page, TransitionRingPage::open(transition_ring_name(pool, instance), {.owners = is_own_or_roots}));
   return TransitionRing(std::move(page));
 }
 

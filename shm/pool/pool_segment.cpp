@@ -166,7 +166,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
                                kMinObjects, kMaxObjects));
   }
   const auto owners = [&options](uid_t user) {
-    return is_trusted_owner(user) || user == options.rights.owner;
+    return is_own_or_roots(user) || user == options.rights.owner;
   };
   const auto open = [&] {
     auto pool = attach_patiently(name, Access::read_write, owners);

@@ -11,6 +11,9 @@ namespace plchost {
 /// each has its own. Set-up.
 [[nodiscard]] Result<void> give_up_capabilities(std::initializer_list<unsigned> given_up);
 [[nodiscard]] Result<void> give_up_all_capabilities();
+/// Takes all but these, and lets the thread use them. One that it does not have does not come by that.
+/// Set-up.
+[[nodiscard]] Result<void> keep_capabilities(std::initializer_list<unsigned> kept);
 
 /// Whether this process, and all that it starts, never gets more rights than it has: no_new_privs.
 [[nodiscard]] bool never_gains_rights() noexcept;

@@ -99,13 +99,26 @@ Result<std::optional<std::string>> PacketSocket::receive() {
   return std::string(buffer.data(), static_cast<std::size_t>(length));
 }
 
-Result<int> PacketSocket::peer_pid() const {
+namespace {
+
+Result<ucred> credentials_of_peer(int fd) {
   ucred credentials{};
   socklen_t size = sizeof credentials;
-  const auto got = check_errno(::getsockopt(fd_.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size),
-                               "cannot read the peer of a socket");
-  if (!got) return std::unexpected(got.error());
+  PLCHOST_TRY(check_errno(::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &size),
+                          "cannot read the peer of a socket"));
+  return credentials;
+}
+
+}  // namespace
+
+Result<int> PacketSocket::peer_pid() const {
+  PLCHOST_TRY_ASSIGN(const auto credentials, credentials_of_peer(fd_.get()));
   return static_cast<int>(credentials.pid);
+}
+
+Result<uid_t> PacketSocket::peer_user() const {
+  PLCHOST_TRY_ASSIGN(const auto credentials, credentials_of_peer(fd_.get()));
+  return credentials.uid;
 }
 
 bool PacketSocket::is_cut() const noexcept {

@@ -36,6 +36,8 @@ class PacketSocket {
   [[nodiscard]] Result<std::optional<std::string>> receive();
   /// The process at the other end, as the kernel says.
   [[nodiscard]] Result<int> peer_pid() const;
+  /// The user that it had when it connected or began to listen.
+  [[nodiscard]] Result<uid_t> peer_user() const;
   /// Whether the other end is closed, as when its process has ended. Takes no packet.
   [[nodiscard]] bool is_cut() const noexcept;
   void close() noexcept { fd_.reset(); }

@@ -1,64 +1,21 @@
 #include "api/server/access/own_user.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <charconv>
 #include <filesystem>
-#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
-#include <grp.h>
-#include <pwd.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/process/capabilities.hpp"
+#include "shm/process/user_account.hpp"
 
 namespace plchost {
 
 namespace {
-
-struct User {
-  uid_t number = 0;
-  std::vector<gid_t> groups;
-};
-
-std::optional<uid_t> number_of_user(std::string_view text) {
-  uid_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
-}
-
-// A number that no account has is a user without other groups.
-Result<User> find_user(const std::string& text) {
-  constexpr std::size_t kRoom = std::size_t{64} << 10;
-  std::vector<char> texts(kRoom);
-  passwd account{};
-  passwd* found = nullptr;
-  const auto number = number_of_user(text);
-  if (number) {
-    (void)::getpwuid_r(*number, &account, texts.data(), texts.size(), &found);
-  } else {
-    (void)::getpwnam_r(text.c_str(), &account, texts.data(), texts.size(), &found);
-  }
-  if (found == nullptr && !number) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("there is no user '{}' on this host", shown(text)));
-  }
-  User user{.number = found == nullptr ? *number : account.pw_uid, .groups = {}};
-  if (user.number == 0) return failure(ErrorCode::invalid_argument, "root is no user with fewer rights");
-  if (found == nullptr) return user;
-  user.groups.resize(256);
-  int count = static_cast<int>(user.groups.size());
-  (void)::getgrouplist(account.pw_name, account.pw_gid, user.groups.data(), &count);
-  user.groups.resize(static_cast<std::size_t>(std::clamp(count, 0, static_cast<int>(user.groups.size()))));
-  return user;
-}
 
 // Lower than what it is allowed now.
 Result<void> limit(decltype(RLIMIT_NICE) what, rlim_t most) {
@@ -68,21 +25,6 @@ Result<void> limit(decltype(RLIMIT_NICE) what, rlim_t most) {
   now.rlim_cur = std::min(now.rlim_cur, now.rlim_max);
   PLCHOST_TRY(check_errno(::setrlimit(what, &now), "cannot set a limit"));
   return {};
-}
-
-Result<void> take_user(const User& user) {
-  const gid_t group = ::getegid();
-  const auto changed = [&](int returned) -> Result<void> {
-    if (returned == 0) return {};
-    const int error = errno;
-    return failure(
-        error == EPERM ? ErrorCode::refused : ErrorCode::system,
-        fmt::format("cannot become user {}: that takes root with CAP_SETUID and CAP_SETGID", user.number),
-        error);
-  };
-  PLCHOST_TRY(changed(::setgroups(user.groups.size(), user.groups.data())));
-  PLCHOST_TRY(changed(::setresgid(group, group, group)));
-  return changed(::setresuid(user.number, user.number, user.number));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/application/declare_application.hpp"
+#include "instances/runtime/setup/own_user.hpp"
 #include "instances/runtime/setup/set_up_watch.hpp"
 #include "instances/runtime/tasks/registered_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
@@ -111,7 +112,18 @@ Result<std::string> Instance::read_settings_file() {
   PLCHOST_TRY_ASSIGN(start_, read_start_settings(options_.launch));
   log_what_is_left_alone(start_.settings);
   choose_scheduler();
-  return hold_idle_states();
+  std::string remark = hold_idle_states();
+  PLCHOST_TRY(become_own_user());
+  return remark;
+}
+
+// After the files that are root's, and before any code of an application.
+Result<void> Instance::become_own_user() {
+  if (options_.launch.user.empty()) return {};
+  auto become = become_user_of_instances(options_.launch.user, options_.launch.pool);
+  if (!become) return failure_in("[host] instance_user", std::move(become).error());
+  spdlog::info("{}", *become);
+  return {};
 }
 
 // Needs the settings, and the cores that bind_core() has got.

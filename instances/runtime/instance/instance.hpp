@@ -182,6 +182,7 @@ class Instance {
 
   [[nodiscard]] LoadContext load_context();
   [[nodiscard]] std::string hold_idle_states();
+  [[nodiscard]] Result<void> become_own_user();
   void choose_scheduler();
   void report_tick();
   void make_outputs_safe(const TaskSet::Fault& fault);

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "shm/files/own_folder.hpp"
 #include "shm/files/replace_file.hpp"
@@ -60,6 +61,10 @@ Result<void> RetainFiles::take() {
     return failure_in("folder for retain variables", ours.error());
   }
   auto held = LockFile::take(stem_ + ".lock");
+  // Of an instance with a user of its own. In the folder of this user only he and root can remove it; that no
+  // other process has this name is the matter of its claim.
+  if (!held && held.error().code == ErrorCode::refused && ::unlink((stem_ + ".lock").c_str()) == 0)
+    held = LockFile::take(stem_ + ".lock");
   if (!held && held.error().code == ErrorCode::already_exists) {
     return failure(ErrorCode::busy, fmt::format("{}: retain files have one instance", held.error().message));
   }

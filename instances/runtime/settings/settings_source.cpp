@@ -18,7 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr mode_t kKeptMode = 0600;
+// The manager's group reads it: a process of another user may be the next one.
+constexpr mode_t kKeptMode = 0640;
 
 Result<std::string> read_text(const std::string& file) {
   std::error_code error;

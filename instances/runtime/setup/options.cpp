@@ -95,6 +95,9 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--run-directory", launch.run_directory, "Where the control socket goes; default: none");
   app.add_option("--state-directory", launch.state_directory,
                  "Where retain variables are written; default: nowhere, they stay as long as the pool");
+  app.add_option("--user", launch.user,
+                 "Run as this user, with no other rights than a PLC needs; default: that of the caller");
+  app.add_option("--trusted-user", launch.trusted_users, "Numbers of other users that instances run as");
   app.add_flag("--no-debug", launch.no_debug, "Refuse an application that is a debug build");
   app.add_flag("--stopped", launch.stopped, "Load the application, do not start it");
   app.add_option("--start-kind", options.start_kind,

@@ -1,6 +1,7 @@
 #include "instances/launch/core_latency.hpp"
 
 #include <csignal>
+#include <fstream>
 #include <optional>
 
 #include <fcntl.h>
@@ -47,6 +48,17 @@ class CoreLatency : public testing::Test {
 
   FakeSysfs files_;
 };
+
+// What it says is written into the kernel's file, by root.
+TEST_F(CoreLatency, IsNotRestoredFromARecordOfAnotherUser) {
+  if (::geteuid() != 0) GTEST_SKIP() << "to give files to another user needs root";
+  files_.add_core(1, "150\n");
+  std::ofstream(files_.record(1)) << "7";
+  ASSERT_EQ(::chown(files_.record(1).c_str(), 65534, 65534), 0);
+  EXPECT_THAT(restore(), IsEmpty());
+  EXPECT_EQ(files_.latency(1), "150");
+  EXPECT_FALSE(take());
+}
 
 TEST_F(CoreLatency, IsHeldAndThenAsBefore) {
   files_.add_core(1, "150\n");

@@ -29,6 +29,8 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
                               .pool = "plant",
                               .run_directory = "/run/plant",
                               .state_directory = "/var/lib/plant",
+                              .user = "plc",
+                              .trusted_users = {7, 8},
                               .stopped = true,
                               .report_fd = 7,
                               .log_level = "debug"};
@@ -45,6 +47,8 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
   EXPECT_EQ(sut.pool, "plant");
   EXPECT_EQ(sut.run_directory, "/run/plant");
   EXPECT_EQ(sut.state_directory, "/var/lib/plant");
+  EXPECT_EQ(sut.user, "plc");
+  EXPECT_THAT(sut.trusted_users, ElementsAre(7, 8));
   EXPECT_TRUE(sut.stopped);
   EXPECT_EQ(sut.report_fd, 7);
   EXPECT_EQ(sut.log_level, "debug");

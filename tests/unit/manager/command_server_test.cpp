@@ -7,8 +7,10 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include "shm/files/memory_rights.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -77,6 +79,30 @@ TEST_F(CommandServerTest, BringsRequestsInAndRepliesBackInAnyOrder) {
   handler_.replies[0]({.number = 1, .code = ErrorCode::ok, .text = ""});
   EXPECT_EQ(reply_on(client).number, 2U);
   EXPECT_EQ(reply_on(client).number, 1U);
+}
+
+// They have the manager's group, which the socket is for.
+TEST_F(CommandServerTest, ServesNoUserOfInstances) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root has instances of another user";
+  constexpr uid_t kUser = 64043;
+  constexpr uid_t kOther = 64044;
+  ASSERT_TRUE(trust_instances_of(kUser));
+  const auto connect_as = [this](uid_t user) {
+    (void)::syscall(SYS_setresuid, -1, user, -1);
+    auto client = PacketSocket::connect(path_);
+    (void)::syscall(SYS_setresuid, -1, 0, -1);
+    return client;
+  };
+  std::filesystem::permissions(path_, std::filesystem::perms(0666));
+  auto instance = connect_as(kUser);
+  auto other = connect_as(kOther);
+  ASSERT_TRUE(instance && other);
+  (void)instance->send(request(1));
+  (void)other->send(request(2));
+  serve();
+  EXPECT_TRUE(is_closed(*instance));
+  ASSERT_EQ(handler_.asked.size(), 1U);
+  EXPECT_EQ(handler_.asked[0].number, 2U);
 }
 
 TEST_F(CommandServerTest, AnswersGarbageAndClosesAfterTooMuchOfIt) {

@@ -78,6 +78,7 @@ constexpr std::array kTwoValues = {
     TwoValues{"[host]", "pool_owner", R"("0")", R"("1")"},
     TwoValues{"[host]", "pool_group", R"("0")", R"("1")"},
     TwoValues{"[host]", "pool_mode", R"("0660")", R"("0600")"},
+    TwoValues{"[host]", "instance_user", R"("1")", R"("65534")"},
     TwoValues{"[host]", "cores", "[0, 1]", "[0, 1, 2]"},
     TwoValues{"[host]", "housekeeping_cores", "[0]", "[1]"},
     TwoValues{"[host]", "read_variables", R"("viewer")", R"("operator")"},
