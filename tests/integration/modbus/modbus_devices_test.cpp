@@ -171,7 +171,7 @@ TEST(ModbusDevices, KeptOutputsThatSilenceHasClearedAreNotSwitchedOnAgain) {
       plant.beat();
       return peer.requests() > before + 100;
     }));
-    if (!sut.logged("is silent")) ASSERT_EQ(peer.holding(7), 99) << "without a silence they are kept";
+    EXPECT_TRUE(sut.logged("is silent") || peer.holding(7) == 99) << "without a silence they are kept";
     plant.show_safe(PLC_IMAGE_STATE_RUNNING, 99, false);
     ASSERT_TRUE(eventually([&] { return peer.holding(7) == 0; }));
     plant.keep(state);
