@@ -1,12 +1,18 @@
 // plchost-modbus between images and real devices of libmodbus, which stall, vanish and answer garbage.
 
 #include <array>
+#include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <thread>
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include "tests/integration/modbus/device_of_a_test.hpp"
@@ -232,6 +238,57 @@ TEST(ModbusDevices, APlcThatNamesNoSafeStateIsSilentWhenItStops) {
       return peer.holding(7) == 0;
     })) << state;
   }
+}
+
+// A port whose queue of connections is full: one more is made when another one is taken out.
+class FullPort {
+ public:
+  FullPort() : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    address_.sin_family = AF_INET;
+    address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address_;
+    EXPECT_EQ(::bind(listener_.get(), generic(), size), 0);
+    EXPECT_EQ(::getsockname(listener_.get(), generic(), &size), 0);
+    EXPECT_EQ(::listen(listener_.get(), 0), 0);
+    first_ = UniqueFd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    EXPECT_EQ(::connect(first_.get(), generic(), size), 0);
+  }
+  [[nodiscard]] std::string address() const { return fmt::format("127.0.0.1:{}", ntohs(address_.sin_port)); }
+  [[nodiscard]] UniqueFd accept() const {
+    return UniqueFd(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  }
+
+ private:
+  sockaddr* generic() { return reinterpret_cast<sockaddr*>(&address_); }
+  UniqueFd listener_;
+  UniqueFd first_;
+  sockaddr_in address_{};
+};
+
+TEST(ModbusDevices, OutputsDoNotGrowOldWhileAConnectionIsMade) {
+  Plant plant;
+  const FullPort port;
+  plant.put_out(0, 0x0815);
+  const ModbusProgram sut(plant, plant.write(fmt::format(R"(
+[[device]]
+name = "valves"
+tcp = "{}"
+timeout_ms = 10000
+silent_after_ms = 600000
+[[device.write]]
+kind = "holding_register"
+address = 7
+image = "t.out"
+)",
+                                                         port.address())));
+  ASSERT_TRUE(eventually([&] { return sut.logged("says the outputs from address 7"); })) << sut.log();
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // it connects
+  plant.put_out(0, 0x0042);
+  (void)port.accept();
+  const UniqueFd device = port.accept();
+  std::array<std::uint8_t, 12> request{};
+  ASSERT_EQ(::recv(device.get(), request.data(), request.size(), MSG_WAITALL), 12);
+  EXPECT_EQ(request[10] << 8U | request[11], 0x0042);
 }
 
 TEST(ModbusDevices, ADeviceThatVanishesIsGoneAndComesBack) {

@@ -98,12 +98,13 @@ bool Device::is_due(Output& output, MapValues& values) {
 LinkResult Device::write_output(Output& output) {
   MapValues values;
   if (!is_due(output, values)) return {};
-  // While the others of a serial line have their turns, the PLC may have stopped.
+  // While the others of a serial line have their turns, or a connection is made, the PLC may have stopped.
   const Link::Turn turn = link_.take_turn();
+  auto result = link_.open(config_);
   values = MapValues();
-  if (!is_due(output, values)) return {};
+  if (result && !is_due(output, values)) return {};
   asked_ = true;
-  auto result = link_.write(config_, *output.map, values);
+  if (result) result = link_.write(config_, *output.map, values);
   note(write_shape(*output.map), result);
   output.is_written = result.has_value();
   output.connection = link_.connection();
@@ -220,7 +221,8 @@ void Device::report(const LinkFailure* failure) {
 
 // A device that refuses one map, or that did not answer last, may take the others.
 void Device::make_safe() {
-  if (config_.when_silent != LossPolicy::zero || quality_ == Quality::none) return;
+  const bool untouched = quality_ == Quality::none && std::ranges::none_of(outputs_, &Output::is_written);
+  if (config_.when_silent != LossPolicy::zero || untouched) return;
   const Duration limit = quality_ == Quality::lost ? kLastAttempt : kSafeStateTimeout;
   bool is_there = true;
   for (const Output& output : outputs_) {

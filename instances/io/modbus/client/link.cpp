@@ -22,6 +22,10 @@ namespace {
 
 using Failure = std::unexpected<std::string>;
 
+LinkFailure not_asked() {
+  return {.text = "this process ends", .not_asked = true};
+}
+
 constexpr int kDataBits = 8;  // of RTU
 // A device that answers does so within that time. At the end one that does not must not keep the line.
 constexpr std::chrono::milliseconds kGraceAtEnd{300};
@@ -155,13 +159,20 @@ std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limit
 
 LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take) {
   const Turn turn = take_turn();
-  if (stop_.is_set() && !limits.at_end)
-    return std::unexpected(LinkFailure{.text = "this process ends", .not_asked = true});
+  if (stop_.is_set() && !limits.at_end) return std::unexpected(not_asked());
   const auto response = line_ ? ask_line(device, limits, asked) : ask_tcp(device, limits, asked);
   auto result = response ? take(response->view())
                          : std::unexpected(LinkFailure{.exception = 0, .text = response.error()});
   if (!result && result.error().exception == 0) keep(UniqueFd());
   return result;
+}
+
+LinkResult Link::open(const DeviceConfig& device) {
+  const Turn turn = take_turn();
+  if (stop_.is_set()) return std::unexpected(not_asked());
+  auto opened = line_ ? open_line(device) : open_tcp(device, {.timeout = device.timeout});
+  if (!opened) return std::unexpected(LinkFailure{.exception = 0, .text = std::move(opened).error()});
+  return {};
 }
 
 LinkResult Link::read(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {

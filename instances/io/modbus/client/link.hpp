@@ -36,6 +36,8 @@ class Link {
   using Turn = std::unique_lock<std::recursive_mutex>;
   [[nodiscard]] Turn take_turn() { return Turn(turn_); }
 
+  /// Connects, or opens the line, if that is not done: a request then waits for nothing before it is sent.
+  [[nodiscard]] LinkResult open(const DeviceConfig& device);
   /// The time limit is that of the device, for the connection and for the whole response.
   [[nodiscard]] LinkResult read(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
   [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
