@@ -31,6 +31,7 @@ struct DebugArguments {
 // The lines of standard input, until its end or "quit". In between the tasks that halt are told.
 Result<void> read_commands(DebugConsole& console) {
   constexpr int kIdleMs = 100;
+  TimePoint next_look;
   const bool terminal = ::isatty(STDIN_FILENO) != 0;
   std::string pending;
   bool prompt = terminal;
@@ -42,11 +43,13 @@ Result<void> read_commands(DebugConsole& console) {
     pollfd ready{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
     const int found = ::poll(&ready, 1, kIdleMs);
     if (interrupted()) return {};
-    if (found <= 0) {
+    // Also between lines that ask for nothing, as comments: else the session would be over.
+    if (const TimePoint now = MonotonicClock::now(); found <= 0 || now >= next_look) {
+      next_look = now + std::chrono::milliseconds(kIdleMs);
       // A state that changes all the time is looked at again.
       if (auto seen = console.look(); !seen && seen.error().code != ErrorCode::busy) return seen;
-      continue;
     }
+    if (found <= 0) continue;
     std::array<char, 4096> bytes{};
     const ssize_t got = ::read(STDIN_FILENO, bytes.data(), bytes.size());
     if (got <= 0) {

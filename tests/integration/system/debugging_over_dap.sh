@@ -24,6 +24,11 @@ echo "- lines of standard input"
 printf 'pause Other\nwait\ntasks\nquit\n' | plcctl debug line1 >"$cell/lines.txt" || fail "$(cat "$cell/lines.txt")"
 grep -q 'task Other halts: pause at Other:' "$cell/lines.txt" || fail "$(cat "$cell/lines.txt")"
 
+echo "- a session lasts, also if each line that comes in 12 s is a comment"
+(echo 'pause Other'; echo wait; for _ in $(seq 240); do echo '# nothing'; sleep 0.05; done; echo 'stack Other') |
+  plcctl debug line1 >"$cell/comments.txt" || fail "$(cat "$cell/comments.txt")"
+grep -q '^#0 Other:' "$cell/comments.txt" || fail "$(cat "$cell/comments.txt")"
+
 echo "- commands that are refused"
 refused "is no debug build" plcctl debug line2 tasks
 refused "no POU" plcctl debug line1 'break Nothing:3'
