@@ -33,7 +33,7 @@ struct SourceText {
 /// The enumerations that the sources declare, by their folded names.
 [[nodiscard]] std::set<std::string> enumerations_in(std::span<const iec::Source> sources);
 
-/// What the compiler knows in another form only becomes that form: Mode#busy, VAR_GLOBAL in a RESOURCE, and
+/// Replaces the words that the compiler knows in another form only: Mode#busy, VAR_GLOBAL in a RESOURCE, and
 /// places that several programs have.
 [[nodiscard]] SourceText text_for_strucpp(const iec::Source& source,
                                           const std::set<std::string>& enumerations);

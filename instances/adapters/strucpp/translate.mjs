@@ -392,7 +392,8 @@ class Plan {
         const target = kLongNames.get(to) ?? to;
         const isOfDates = ['DATE', 'TOD', 'DT'].includes(from) && ['DATE', 'TOD', 'DT'].includes(target) && from !== target;
         if (isOfDates) text = `${name}: STruC++ copies the number, which counts days in a DATE, and nanoseconds in TOD and DT`;
-        if (from === 'STRING' && target === 'BOOL') text = `${name}: STruC++ makes TRUE of each text; compare it with 'TRUE'`;
+        const isLiteral = node.arguments[0]?.value?.kind === 'LiteralExpression';
+        if (from === 'STRING' && target === 'BOOL' && isLiteral) text = `${name}: STruC++ makes TRUE of each text that is no variable; write TRUE or FALSE`;
         if (['DATE', 'TOD', 'DT', 'TIME'].includes(from) && target === 'STRING') this.remark(node, `${name}: STruC++ writes the number of ${from === 'DATE' ? 'days' : 'nanoseconds'}`);
       }
       if (text !== undefined) problems.push({ place: placeOf(node), text });

@@ -351,6 +351,8 @@ TEST_F(TranslatedByStrucpp, ThatStrucppRefusesIsToldInItsOwnWords) {
               HasSubstr("twice.st:35:5: PROGRAM rest: STruC++ cannot translate connections"));
   text = kTwice;
   text.replace(text.find("    TASK fast"), 0, "    VAR_GLOBAL own : INT; END_VAR\n");
+  text.replace(text.find("END_CONFIGURATION"), 0,
+               "RESOURCE other ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); END_RESOURCE\n");
   EXPECT_THAT(build(text, "twice", "strucpp").output,
               HasSubstr("own: STruC++ knows no VAR_GLOBAL in a RESOURCE"));
 }

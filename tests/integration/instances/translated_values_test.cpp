@@ -94,7 +94,8 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
       "PROGRAM Main\nVAR_EXTERNAL shared : INT; END_VAR\n"
       "VAR t1 : STRING; text : STRING := 'ABCDE'; mode1 : Mode := Mode#busy; is_busy : BOOL; cycles : DINT;\n"
       "adder1 : Adder; marker AT %MW3 : INT; again AT %MB6 : BYTE; END_VAR\nVAR_TEMP own : INT; END_VAR\n"
-      "t1 := INSERT(text, 'xy', 2); own := own + 1; shared := own;\n"
+      "t1 := INSERT(text, 'xy', 2); text := TIME_TO_STRING(T#1s); text := 'ABCDE'; own := own + 1; shared := "
+      "own;\n"
       "CASE mode1 OF Mode#idle: is_busy := FALSE; Mode#busy: is_busy := TRUE; END_CASE;\n"
       "adder1(); marker := 16#0102; cycles := cycles + 1;\nEND_PROGRAM\n"
       "PROGRAM Reader\nVAR marker AT %MW3 : INT; copy : INT; END_VAR\ncopy := marker;\nEND_PROGRAM\n"
@@ -105,6 +106,7 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
                                 sandbox.folder() + "/values.so", "--compiler", "strucpp"},
                                sandbox.folder());
   ASSERT_TRUE(end && end->success()) << end->output;
+  EXPECT_THAT(end->output, HasSubstr("note: TIME_TO_STRING: STruC++ writes the number of nanoseconds"));
   InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
   sut.wait_until_up();
   ValueClient client(sandbox);
@@ -126,8 +128,8 @@ TEST_F(ValuesOfTranslatedText, OfDatesThatStrucppDoesNotConvertAreRefused) {
   if (IsSkipped()) return;
   const ProgramEnd end = build("d : DATE; e : DATE; o : TOD; w : DT; t : TIME; s : STRING; b : BOOL;",
                                "d := DT_TO_DATE(w); o := DATE_AND_TIME_TO_TOD(w);\nw := DATE_TO_DT(d);\nt := "
-                               "d - e;\nb := STRING_TO_BOOL(s);\n"
-                               "w := w + T#1h; o := o - T#1h; t := T#2s - T#1s; s := TIME_TO_STRING(t); d := "
+                               "d - e;\nb := STRING_TO_BOOL('FALSE');\n"
+                               "w := w + T#1h; o := o - T#1h; t := T#2s - T#1s; b := STRING_TO_BOOL(s); d := "
                                "STRING_TO_DATE(s); b := d = e;",
                                "strucpp");
   EXPECT_FALSE(end.success());
@@ -136,9 +138,7 @@ TEST_F(ValuesOfTranslatedText, OfDatesThatStrucppDoesNotConvertAreRefused) {
   EXPECT_THAT(end.output, HasSubstr("values.st:6:6: DATE_TO_DT: STruC++ copies the number"));
   EXPECT_THAT(end.output, HasSubstr("values.st:7:6: STruC++ counts days here"));
   EXPECT_THAT(end.output, HasSubstr("values.st:8:6: STRING_TO_BOOL: STruC++ makes TRUE of each text"));
-  EXPECT_THAT(end.output,
-              HasSubstr("values.st:9:54: note: TIME_TO_STRING: STruC++ writes the number of nanoseconds"));
-  EXPECT_THAT(end.output, Not(HasSubstr("values.st:9:1: S")));
+  EXPECT_THAT(end.output, Not(HasSubstr("values.st:9:")));
 }
 
 TEST_F(ValuesOfTranslatedText, ThatStrucppChangesAreRefusedAtTheirPlace) {
