@@ -47,7 +47,7 @@ Result<void> try_application(const std::string& plc_instance, const HostConfig& 
   launch.pool = host.pool;
   launch.state_directory = host.state_directory;
   launch.no_debug = !host.allow_debug;
-  // Somebody else who checks a file tries with the own rights.
+  // Another user checks a file with the own rights.
   if (::geteuid() == 0) launch.user = host.instance_user;
   PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(plc_instance, launch));
   trial.await_end();

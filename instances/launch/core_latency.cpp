@@ -45,7 +45,7 @@ std::optional<int> core_of_record(std::string_view name) {
   return whole ? std::optional(core) : std::nullopt;
 }
 
-// What it says is written into the kernel's file. Where instances have a user of their own, that user can
+// Its text is written into the kernel's file. Where instances have a user of their own, that user can
 // make files in the run directory, too.
 bool is_own_or_roots(int record) {
   struct stat status{};

@@ -150,7 +150,7 @@ Result<OutputsPage> OutputsPage::create(std::string_view pool, std::string_view 
                                           fill_outputs(bytes, outputs);
                                           return {};
                                         },
-                                        {.mode = 0640});
+                                        {.mode = 0600});
   if (!made) return std::unexpected(made.error());
   return OutputsPage(name);
 }

@@ -13,7 +13,7 @@ chmod 711 "$cell"
 setpriv --reuid "$user" --regid "$group" --clear-groups test -x "$cell" ||
   fail "user $user may not enter $cell, or a folder above it"
 mkdir -m 755 "$cell/applications"
-cp "$APPLICATIONS"/{packer,task_faults,online_1,online_2}.so "$cell/applications"
+cp "$APPLICATIONS"/{packer,task_faults,online_1,online_2,manager_fails_at_start}.so "$cell/applications"
 chmod 644 "$cell/applications"/*.so
 APPLICATIONS=$cell/applications
 printf '[CmpSchedule]\nTask.Freewheeling.Cycletime=10\n' >"$cell/applications/line.cfg"
@@ -98,6 +98,9 @@ until_true 20 faulted 1
 plcctl reset instance line2 && plcctl start instance line2 || fail "line2 after its exception"
 plcctl load application line3 "$APPLICATIONS/online_2.so" --online >"$cell/answer.log" || fail "no online change: $(cat "$cell/answer.log")"
 grep -q "taken over between two cycles" "$cell/answer.log" || fail "$(cat "$cell/answer.log")"
+! answer=$(plcctl load application line3 "$APPLICATIONS/manager_fails_at_start.so" 2>&1) || fail "an application that does not come up: $answer"
+grep -q "is started again" <<<"$answer" || fail "the application before is not started again: $answer"
+until_true 30 runs_as line3 "$user"
 plcctl register event line1/extra >/dev/null || fail "no event is registered"
 plcctl logs line1 -n 1 >/dev/null && plcctl list objects >/dev/null || fail "it shows less"
 plcctl reset statistics line1 >/dev/null || fail "a command"
@@ -150,7 +153,7 @@ PY
 )
 is "$answer" ended || fail "the manager serves an instance: $answer"
 
-echo "- what it has put under the manager's names is not believed"
+echo "- files that it has put under the manager's names are not believed"
 kill -KILL "$manager" && wait "$manager" 2>/dev/null || true
 line1=$(pgrep -f "^$BIN/plc-instance --name line1 .*$cell/")
 rm "$cell/cell1/manager.lock" "$cell/cell1/manager.sock" "/dev/shm/$pool-cell1.host"

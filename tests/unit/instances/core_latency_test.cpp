@@ -49,7 +49,7 @@ class CoreLatency : public testing::Test {
   FakeSysfs files_;
 };
 
-// What it says is written into the kernel's file, by root.
+// Root writes its text into the kernel's file.
 TEST_F(CoreLatency, IsNotRestoredFromARecordOfAnotherUser) {
   if (::geteuid() != 0) GTEST_SKIP() << "to give files to another user needs root";
   files_.add_core(1, "150\n");

@@ -1,0 +1,130 @@
+// The rights to the folders and files of a host: those of the Manager, of instances and of the API server.
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <unistd.h>
+
+#include "api/control/application_versions.hpp"
+#include "manager/manager.hpp"
+#include "manager/server_files.hpp"
+#include "shm/files/memory_rights.hpp"
+#include "shm/files/own_folder.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/foreign_files.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr Duration kStateLimit = std::chrono::seconds(2);
+
+}  // namespace
+
+// Applications in them are run, and wishes followed. A disk that hangs is no reason to stop a plant here,
+// either.
+Result<void> Manager::check_state_folders() {
+  const HostConfig& host = config_.host;
+  const std::vector<std::string> folders{host.state_directory, wishes_folder(host.state_directory, host.name),
+                                         applications_folder(host.state_directory, host.name),
+                                         audit_folder(host)};
+  const auto check = [folders]() -> Result<void> {
+    for (const std::string& folder : folders) {
+      auto ours = check_own_folder(folder);
+      if (!ours && ours.error().code == ErrorCode::refused) return ours;
+    }
+    return {};
+  };
+  constexpr const char* kWhere = "[host] state_directory";
+  const auto checked = state_disk_.ask<Result<void>>(kStateLimit, kWhere, check);
+  if (!checked) {
+    spdlog::error("the manager cannot see who may write there: {}", checked.error().describe());
+  } else if (!*checked) {
+    return failure_in(kWhere, checked->error());
+  }
+  return {};
+}
+
+// Also those of instances that run on from before another configuration.
+Result<void> Manager::find_instance_user() {
+  const HostConfig& host = config_.host;
+  std::vector<uid_t> users = users_in(host.run_directory);
+  if (!host.instance_user.empty()) {
+    auto found = find_user(host.instance_user);
+    if (!found) return failure_in("[host] instance_user", std::move(found).error());
+    instance_user_ = *std::move(found);
+    users.insert(users.begin(), instance_user_->number);
+  }
+  for (const uid_t user : users) {
+    if (!trust_instances_of(user))
+      spdlog::error("instances of user {} cannot be seen: {} other users are known", user,
+                    kMostInstanceUsers);
+  }
+  return {};
+}
+
+// Instances that lack something say so themselves; a disk that hangs keeps none from its start.
+void Manager::share_folders() {
+  const HostConfig& host = config_.host;
+  const auto shared = share_with_instances(host.run_directory, instance_user_);
+  if (!shared) spdlog::error("[host] run_directory: instances may lack it: {}", shared.error().describe());
+  const auto share = [folder = host.state_directory, user = instance_user_]() -> Result<void> {
+    std::error_code error;
+    if (user) std::filesystem::create_directories(folder, error);
+    if (!user && !std::filesystem::exists(folder, error)) return {};
+    return share_with_instances(folder, user);
+  };
+  const auto done = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
+  const auto& error = done ? *done : std::unexpected(done.error());
+  if (!error) spdlog::error("instances may lack [host] state_directory: {}", error.error().describe());
+}
+
+void Manager::prepare_files(const std::string& instance) {
+  const HostConfig& host = config_.host;
+  hand_over_files({.instance = instance, .pool = host.pool, .run_directory = host.run_directory},
+                  instance_user_);
+  if (!instance_user_) return;
+  const auto hand_over = [folder = host.state_directory, instance, user = instance_user_] {
+    hand_over_retain_files(folder, instance, user);
+    return true;
+  };
+  const auto done = state_disk_.ask<bool>(kStateLimit, "[host] state_directory", hand_over);
+  if (!done)
+    spdlog::error("instance {}: it may lack its retain files: {}", instance, done.error().describe());
+}
+
+bool Manager::server_has_own_user() const noexcept {
+  return config_.dds.enabled && !config_.dds.user.empty();
+}
+
+// A server that lacks something says so itself; a disk that hangs keeps no instance from its start.
+void Manager::share_with_server() {
+  if (!server_has_own_user() && !instance_user_) return;
+  give_roots_files(config_.host.pool, ::getegid());
+  std::optional<gid_t> group;
+  if (server_has_own_user()) {
+    const auto server = find_user(config_.dds.user);
+    if (!server) return spdlog::error("[dds] user: {}", server.error().describe());
+    group = server->group;
+  }
+  const std::string audit = audit_folder(config_.host);
+  const std::string applications = applications_folder(config_.host.state_directory, config_.host.name);
+  // The audit log is not for the manager's group: instances have it, too.
+  const auto share = [audit, applications, group]() -> Result<void> {
+    PLCHOST_TRY(share_folder(applications, GroupRight::reads));
+    if (!group) return keep_folder(audit);
+    PLCHOST_TRY(share_folder(audit, GroupRight::writes, group));
+    for (const std::string& folder : {audit + "/refused", audit + "/under_way"})
+      PLCHOST_TRY(share_folder(folder, GroupRight::writes));
+    return {};
+  };
+  const auto shared = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
+  const auto& error = shared ? *shared : std::unexpected(shared.error());
+  if (!error) spdlog::error("the API server may lack files: {}", error.error().describe());
+}
+
+}  // namespace plchost
