@@ -192,6 +192,32 @@ void plchost_put_places(const struct plchost_task* task) {
   }
 }
 
+void plchost_exchange_places(const struct plchost_task* task) {
+  unsigned char* found[AREAS];
+  unsigned int step;
+  unsigned int i;
+  find_areas(found);
+  for (step = 0; step < 2; ++step) { /* all of them are put before any is taken */
+    for (i = 0; i < task->uses_count; ++i) {
+      struct plchost_use* const use = &task->uses[i];
+      const struct plchost_place* const place = &plchost_places[use->place];
+      unsigned char* const area = found[area_of(place) - areas];
+      if (!place->aliased || place->area == 'I') continue;
+      if (place->area == 'M') {
+        if (step == 0)
+          put_memory(use->place, area);
+        else
+          take_memory(use->place, area);
+      } else if (step == 0) {
+        put_output(use, area);
+      } else {
+        use->before = load(place, area);
+        set_value(use->value, place->bytes, use->before);
+      }
+    }
+  }
+}
+
 unsigned char plchost_bit_now(unsigned int number) {
   const struct plchost_place* const place = &plchost_places[number];
   const unsigned char* const area = plc_area_address(area_of(place)->handle);

@@ -121,6 +121,9 @@ int plchost_declare_places(void);
 void plchost_forget_places(void);
 void plchost_take_places(const struct plchost_task* task);
 void plchost_put_places(const struct plchost_task* task);
+/* Between two programs of a task: the second one has the places that the first one has changed by another
+ * name. */
+void plchost_exchange_places(const struct plchost_task* task);
 /* The bit of a place in the memory area as it is now. Any thread. */
 unsigned char plchost_bit_now(unsigned int place);
 

@@ -164,11 +164,23 @@ void GlueWriter::write_task(const PlannedTask& task, std::size_t number) {
   const std::size_t uses = write_uses(number);
   print("static const unsigned int plchost_retained_{}[] = {{{}}};\n", number, list_of(retained_by(number)));
   print("static void plchost_run_{0}(void) {{\n  plchost_begin({0});\n", number);
-  for (const Program* const program : task.programs) write_call(*program);
+  const bool shares = shares_bits(number);
+  for (const Program* const program : task.programs) {
+    if (shares && program != task.programs.front())
+      print("  plchost_exchange_places(&plchost_tasks[{}]);\n", number);
+    write_call(*program);
+  }
   print("  plchost_end({});\n}}\n", number);
   if (!task.single.empty()) write_edge(task, number);
   if (task.extension.options) write_options(*task.extension.options, number);
   use_counts_.push_back(uses);
+}
+
+// Not inputs: no program changes them for the others.
+bool GlueWriter::shares_bits(std::size_t task) const {
+  return std::ranges::any_of(places_, [&](const Known& known) {
+    return known.aliased && known.place.area != 'I' && known.tasks.contains(task);
+  });
 }
 
 void GlueWriter::write_edge(const PlannedTask& task, std::size_t number) {

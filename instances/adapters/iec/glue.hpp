@@ -104,6 +104,7 @@ class GlueWriter {
   void write_places();
   void find_aliases();
   void refuse_shared_bits();
+  [[nodiscard]] bool shares_bits(std::size_t task) const;
   void write_task(const PlannedTask& task, std::size_t number);
   void write_edge(const PlannedTask& task, std::size_t number);
   std::size_t write_uses(std::size_t number);

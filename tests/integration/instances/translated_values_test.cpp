@@ -98,7 +98,8 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
       "own;\n"
       "CASE mode1 OF Mode#idle: is_busy := FALSE; Mode#busy: is_busy := TRUE; END_CASE;\n"
       "adder1(); marker := 16#0102; cycles := cycles + 1;\nEND_PROGRAM\n"
-      "PROGRAM Reader\nVAR marker AT %MW3 : INT; copy : INT; END_VAR\ncopy := marker;\nEND_PROGRAM\n"
+      "PROGRAM Reader\nVAR marker AT %MW3 : INT; copy : INT; END_VAR\ncopy := marker; marker := "
+      "7;\nEND_PROGRAM\n"
       "CONFIGURATION cell RESOURCE press ON PLC\nVAR_GLOBAL shared : INT; END_VAR\n"
       "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
       "PROGRAM two WITH fast : Reader;\nEND_RESOURCE END_CONFIGURATION\n";
@@ -118,7 +119,8 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
                                     {"one.is_busy", "TRUE"},
                                     {"one.adder1.sum", "6"},
                                     {"shared", "1"},
-                                    {"two.copy", "258"}}) {
+                                    {"two.copy", "258"},
+                                    {"two.marker", "7"}}) {
     EXPECT_EQ(client.read(name), value) << name;
   }
 }

@@ -243,6 +243,9 @@ TEST_F(MatiecGlue, RefusesOutputsThatShareBitsInTwoTasks) {
   const Glue one = write(programs, "", kFast + slow + "PROGRAM two WITH fast : B;", located);
   EXPECT_THAT(texts(one.problems), IsEmpty());
   EXPECT_THAT(one.text, HasSubstr("{\"__QB0\", 'Q', 1, -1, 1, 0u, &plchost_value_0}"));
+  EXPECT_THAT(one.text, HasSubstr("A_body__(&PRESS__ONE);\n  plchost_exchange_places(&plchost_tasks[0]);\n"
+                                  "  B_body__(&PRESS__TWO);\n  plchost_end(0);"))
+      << "the second program has what the first one has written";
 }
 
 TEST_F(MatiecGlue, GivesEachTaskItsOwnValueOfAnInputOfItsPrograms) {
