@@ -50,7 +50,7 @@ Result<void> make_run_directory(const std::string& path) {
   std::filesystem::create_directories(path, error);
   if (error) return failure(ErrorCode::system, "cannot create the run directory " + path, error.value());
   // Locks, sockets and records in it are believed.
-  if (auto ours = check_own_folder(path); !ours) return failure_in("[host] run_directory", ours.error());
+  PLCHOST_TRY(in_step("[host] run_directory", check_own_folder(path)));
   return {};
 }
 
@@ -124,7 +124,7 @@ Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Op
   if (!lock && lock.error().code == ErrorCode::already_exists) {
     return failure_in("another manager runs with this run directory", lock.error());
   }
-  if (!lock) return std::unexpected(lock.error());
+  PLCHOST_TRY(lock);
   PLCHOST_TRY_ASSIGN(auto reactor, Reactor::create());
   std::unique_ptr<Manager> manager(new Manager(  // NOLINT: the constructor is private
       config, std::move(options), std::move(*lock), std::move(reactor)));

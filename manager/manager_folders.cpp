@@ -78,9 +78,9 @@ void Manager::share_folders() {
     if (!user && !std::filesystem::exists(folder, error)) return {};
     return share_with_instances(folder, user);
   };
-  const auto done = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
-  const auto& error = done ? *done : std::unexpected(done.error());
-  if (!error) spdlog::error("instances may lack [host] state_directory: {}", error.error().describe());
+  const auto answered = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
+  const auto shared = and_then(answered, [](const Result<void>& done) { return done; });
+  if (!shared) spdlog::error("instances may lack [host] state_directory: {}", shared.error().describe());
 }
 
 void Manager::prepare_files(const std::string& instance) {
@@ -122,9 +122,9 @@ void Manager::share_with_server() {
       PLCHOST_TRY(share_folder(folder, GroupRight::writes));
     return {};
   };
-  const auto shared = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
-  const auto& error = shared ? *shared : std::unexpected(shared.error());
-  if (!error) spdlog::error("the API server may lack files: {}", error.error().describe());
+  const auto answered = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
+  const auto shared = and_then(answered, [](const Result<void>& done) { return done; });
+  if (!shared) spdlog::error("the API server may lack files: {}", shared.error().describe());
 }
 
 }  // namespace plchost

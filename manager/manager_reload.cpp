@@ -60,9 +60,9 @@ Result<std::vector<std::string>> Manager::reload() {
   PLCHOST_TRY(supervisor_->check_room(now.instances));
   for (const InstanceConfig& instance : now.instances) {
     if (transitions_.contains(instance.name)) continue;
-    auto ring = TransitionRing::open(config_.host.pool, instance.name);
-    if (!ring) return failure_in(fmt::format("instance '{}'", instance.name), ring.error());
-    transitions_.emplace(instance.name, *std::move(ring));
+    PLCHOST_TRY_ASSIGN(auto ring, in_step(fmt::format("instance '{}'", instance.name),
+                                          TransitionRing::open(config_.host.pool, instance.name)));
+    transitions_.emplace(instance.name, std::move(ring));
   }
   std::vector<std::string> lines;
   take_over_host(now, lines);
@@ -107,9 +107,9 @@ void Manager::use_housekeeping_cores(std::vector<std::string>& lines) const {
 }
 
 void Manager::use_pool_rights(std::vector<std::string>& lines) const {
-  const auto rights = pool_rights(config_.host);
-  const auto renewed =
-      rights ? renew_pool_rights(config_.host.pool, *rights) : std::unexpected(rights.error());
+  const auto renewed = and_then(pool_rights(config_.host), [&](const auto& rights) {
+    return renew_pool_rights(config_.host.pool, rights);
+  });
   if (!renewed) lines.push_back(renewed.error().describe());
 }
 

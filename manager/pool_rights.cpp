@@ -30,14 +30,10 @@ bool has(const struct stat& status, const MemoryRights& rights) {
 Result<MemoryRights> pool_rights(const HostConfig& host) {
   MemoryRights rights{.mode = host.pool_mode};
   if (!host.pool_owner.empty()) {
-    const auto owner = user_number(host.pool_owner);
-    if (!owner) return failure_in("[host] pool_owner", owner.error());
-    rights.owner = *owner;
+    PLCHOST_TRY_ASSIGN(rights.owner, in_step("[host] pool_owner", user_number(host.pool_owner)));
   }
   if (!host.pool_group.empty()) {
-    const auto group = group_number(host.pool_group);
-    if (!group) return failure_in("[host] pool_group", group.error());
-    rights.group = *group;
+    PLCHOST_TRY_ASSIGN(rights.group, in_step("[host] pool_group", group_number(host.pool_group)));
   }
   return rights;
 }
@@ -75,9 +71,7 @@ Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& righ
   }
   if (has(before, rights)) return {};
   const std::string had = describe_rights(before.st_uid, before.st_gid, before.st_mode);
-  if (const auto given = give_rights(fd.get(), rights, path); !given) {
-    return failure_in(fmt::format("pool '{}' keeps {}", pool, had), given.error());
-  }
+  PLCHOST_TRY(in_step(fmt::format("pool '{}' keeps {}", pool, had), give_rights(fd.get(), rights, path)));
   struct stat now{};
   if (::fstat(fd.get(), &now) != 0) return {};
   spdlog::info("pool '{}' had {}; it has {} now", pool, had,

@@ -84,7 +84,8 @@ std::vector<std::string> save_retain_memories(const ManagerConfig& config, const
   const TimePoint deadline = MonotonicClock::now() + kSaveLimit;
   std::vector<std::string> unsaved;
   for (const auto& [memory, process] : all) {
-    const auto saved = process ? wait_until_saved(*process, deadline) : std::unexpected(process.error());
+    const auto saved =
+        and_then(process, [&](const auto& started) { return wait_until_saved(started, deadline); });
     if (saved) continue;
     spdlog::warn("the retain variables in memory '{}' are in no file and stay in {}: {}", memory,
                  MemoryFile::kDirectory, saved.error().describe());

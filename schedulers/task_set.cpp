@@ -36,12 +36,10 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
   self->fault_board_.tell(self->environment_.halted);
   for (TaskConfig& config : tasks) {
     const std::string step = fmt::format("task '{}'", config.name);
-    if (auto added = self->add(std::move(config)); !added) return failure_in(step, std::move(added.error()));
+    PLCHOST_TRY(in_step(step, self->add(std::move(config))));
   }
   const ThreadPriority tick = self->environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band);
-  if (auto ticker = self->ticker_.start_thread(tick); !ticker) {
-    return failure_in("tick", std::move(ticker.error()));
-  }
+  PLCHOST_TRY(in_step("tick", self->ticker_.start_thread(tick)));
   if (self->environment_.catch_faults) {
     PLCHOST_TRY(self->supervise());
   }

@@ -34,9 +34,7 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
     }
     arrangement->sources.push_back(std::move(*source));
   }
-  if (auto planned = plan_ticks(*arrangement, settings); !planned) {
-    return failure_in(name, failure_in("tick source", std::move(planned.error())).error());
-  }
+  PLCHOST_TRY(in_step(name, in_step("tick source", plan_ticks(*arrangement, settings))));
   return arrangement;
 }
 

@@ -15,11 +15,8 @@ Result<WaitSet> WaitSet::create(dds_entity_t participant) {
                      dds::check_entity(dds_create_waitset(participant), "cannot create a wait set"));
   PLCHOST_TRY_ASSIGN(auto woken, dds::check_entity(dds_create_guardcondition(participant),
                                                    "cannot create a guard condition"));
-  if (auto added = dds::check_code(dds_waitset_attach(made.get(), woken.get(), woken.get()),
-                                   "cannot add to a wait set");
-      !added) {
-    return std::unexpected(added.error());
-  }
+  PLCHOST_TRY(
+      dds::check_code(dds_waitset_attach(made.get(), woken.get(), woken.get()), "cannot add to a wait set"));
   return WaitSet(std::move(made), std::move(woken));
 }
 

@@ -190,9 +190,7 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
   }
   if (!options.identity.empty()) {
     // Cyclone would say why in its log only.
-    if (const auto good = security::check_identity(options.identity); !good) {
-      return failure_in("identity", good.error());
-    }
+    PLCHOST_TRY(in_step("identity", security::check_identity(options.identity)));
   }
   PLCHOST_TRY_ASSIGN(auto made,
                      check_entity(dds_create_domain(options.domain, configuration.c_str()),

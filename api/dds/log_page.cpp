@@ -50,9 +50,8 @@ Result<LogQuery> log_query_of(const plc_ListPart& part) {
 
 Result<LogListing> look_at_log(std::string_view pool, std::string_view instance, const LogQuery& query) {
   LogListing listing{.clock_unix_ns = unix_time_ns(), .next_after = query.after};
-  const auto reader = LogRingReader::open(pool, instance);
-  if (!reader && reader.error().code == ErrorCode::not_found) return listing;
-  PLCHOST_TRY(reader);
+  PLCHOST_TRY_ASSIGN(const auto reader, if_found(LogRingReader::open(pool, instance)));
+  if (!reader) return listing;
   const LogSlice slice =
       query.newest > 0 ? reader->newest(query.newest, kPageRecords) : reader->read(query.after, kPageRecords);
   listing.stream = static_cast<std::uint64_t>(slice.stream_unix_ns);

@@ -34,10 +34,8 @@ BlockGateway::~BlockGateway() {
 Result<std::unique_ptr<BlockGateway>> BlockGateway::create(dds_entity_t participant, GatewayOptions options,
                                                            const WaitSet& wait_set) {
   std::unique_ptr<BlockGateway> gateway(new BlockGateway(participant, std::move(options)));
-  if (auto opened = gateway->open_node(); !opened) return failure_in("gateway", std::move(opened).error());
-  if (auto opened = gateway->open_topics(wait_set); !opened) {
-    return failure_in("gateway", std::move(opened).error());
-  }
+  PLCHOST_TRY(in_step("gateway", gateway->open_node()));
+  PLCHOST_TRY(in_step("gateway", gateway->open_topics(wait_set)));
   gateway->announce(MonotonicClock::now());
   return gateway;
 }

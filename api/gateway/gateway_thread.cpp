@@ -12,13 +12,13 @@ constexpr Duration kNextAttempt = std::chrono::seconds(1);
 
 Result<std::unique_ptr<GatewayThread>> GatewayThread::start(dds_entity_t participant,
                                                             GatewayOptions options) {
-  auto wait_set = WaitSet::create(participant);
-  if (!wait_set) return failure_in("gateway", std::move(wait_set).error());
+  PLCHOST_TRY_ASSIGN(auto wait_set, in_step("gateway", WaitSet::create(participant)));
   std::unique_ptr<GatewayThread> gateway(
-      new GatewayThread(participant, std::move(options), *std::move(wait_set)));
-  auto thread = Thread::start("gateway", {}, [gateway = gateway.get()] { gateway->run(); });
-  if (!thread) return failure_in("gateway", std::move(thread).error());
-  gateway->thread_ = *std::move(thread);
+      new GatewayThread(participant, std::move(options), std::move(wait_set)));
+  PLCHOST_TRY_ASSIGN(
+      auto thread,
+      in_step("gateway", Thread::start("gateway", {}, [gateway = gateway.get()] { gateway->run(); })));
+  gateway->thread_ = std::move(thread);
   return gateway;
 }
 

@@ -72,17 +72,13 @@ Result<OwnIdentity> check_identity(const std::string& folder) {
   PLCHOST_TRY_ASSIGN(const auto certificate, read_certificate(file_in(folder, kCertificateFile)));
   PLCHOST_TRY_ASSIGN(const auto authority, read_certificate(file_in(folder, kIdentityAuthorityFile)));
   PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(file_in(folder, kRevocationsFile)));
-  if (auto good = verify_revocations(revocations, authority); !good) return failure_in(folder, good.error());
-  if (auto good = verify_certificate(certificate, authority, revocations); !good) {
-    return failure_in(folder, good.error());
-  }
+  PLCHOST_TRY(in_step(folder, verify_revocations(revocations, authority)));
+  PLCHOST_TRY(in_step(folder, verify_certificate(certificate, authority, revocations)));
   PLCHOST_TRY(check_key(file_in(folder, kKeyFile), certificate));
   PLCHOST_TRY(check_documents(folder, certificate));
-  auto subject = subject_of(certificate);
-  if (!subject) return failure_in(folder, subject.error());
-  const auto validity = validity_of(certificate);
-  if (!validity) return failure_in(folder, validity.error());
-  return OwnIdentity{std::move(*subject), *validity};
+  PLCHOST_TRY_ASSIGN(auto subject, in_step(folder, subject_of(certificate)));
+  PLCHOST_TRY_ASSIGN(const auto validity, in_step(folder, validity_of(certificate)));
+  return OwnIdentity{std::move(subject), validity};
 }
 
 }  // namespace plchost::security

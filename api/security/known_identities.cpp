@@ -23,16 +23,11 @@ Result<std::optional<Certified>> read_known(const std::string& path, const Certi
                                             const RevocationList& revocations) {
   PLCHOST_TRY_ASSIGN(const auto certificate, read_certificate(path));
   if (is_revoked(certificate, revocations)) return std::nullopt;
-  if (auto good = verify_certificate(certificate, authority, revocations); !good) {
-    return failure_in(path, good.error());
-  }
-  auto subject = subject_of(certificate);
-  if (!subject) return failure_in(path, subject.error());
-  const auto prefix = guid_prefix(certificate);
-  if (!prefix) return failure_in(path, prefix.error());
-  const auto validity = validity_of(certificate);
-  if (!validity) return failure_in(path, validity.error());
-  return std::optional(Certified{*prefix, std::move(*subject), *validity});
+  PLCHOST_TRY(in_step(path, verify_certificate(certificate, authority, revocations)));
+  PLCHOST_TRY_ASSIGN(auto subject, in_step(path, subject_of(certificate)));
+  PLCHOST_TRY_ASSIGN(const auto prefix, in_step(path, guid_prefix(certificate)));
+  PLCHOST_TRY_ASSIGN(const auto validity, in_step(path, validity_of(certificate)));
+  return std::optional(Certified{prefix, std::move(subject), validity});
 }
 
 }  // namespace

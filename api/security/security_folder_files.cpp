@@ -31,20 +31,19 @@ Result<void> make_folder(const std::string& path) {
 
 Result<IdentityView> SecurityFolder::view(const std::string& name) const {
   PLCHOST_TRY(check_name("identity", name, kMaxIdentityName));
-  const auto certificate = read_certificate(file_in(path(name), kCertificateFile));
+  PLCHOST_TRY_ASSIGN(const auto certificate,
+                     if_found(read_certificate(file_in(path(name), kCertificateFile))));
   if (!certificate) {
-    if (certificate.error().code != ErrorCode::not_found) return std::unexpected(certificate.error());
     PLCHOST_TRY_ASSIGN(const auto all, names());
     const std::vector<std::string_view> known(all.begin(), all.end());
     return failure(ErrorCode::not_found,
                    fmt::format("no identity '{}' in {}; there are: {}", name, folder_, join_names(known)));
   }
   PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(authority_file(kRevocationsFile)));
-  auto subject = subject_of(*certificate);
-  if (!subject) return failure_in(path(name), subject.error());
+  PLCHOST_TRY_ASSIGN(auto subject, in_step(path(name), subject_of(*certificate)));
   PLCHOST_TRY_ASSIGN(const auto validity, validity_of(*certificate));
   PLCHOST_TRY_ASSIGN(const auto prefix, guid_prefix(*certificate));
-  return IdentityView{std::move(*subject), validity, is_revoked(*certificate, revocations), prefix};
+  return IdentityView{std::move(subject), validity, is_revoked(*certificate, revocations), prefix};
 }
 
 Result<void> SecurityFolder::write_identity(const std::string& to, const Subject& subject,

@@ -57,10 +57,9 @@ void raise_event(int fd) noexcept {
 
 Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions options) {
   PLCHOST_TRY(check_name("host", options.host, kMaxHostName));
-  auto pool = ObjectPool::attach(options.pool);
-  if (!pool) return failure_in("cannot attach the pool", pool.error());
+  PLCHOST_TRY_ASSIGN(auto pool, in_step("cannot attach the pool", ObjectPool::attach(options.pool)));
   const auto epoch = static_cast<std::uint64_t>(unix_time_ns());
-  auto parts = std::make_unique<Parts>(std::move(options), std::move(*pool), epoch);
+  auto parts = std::make_unique<Parts>(std::move(options), std::move(pool), epoch);
   PLCHOST_TRY(parts->open());
   return std::unique_ptr<ControlServer>(new ControlServer(std::move(parts)));
 }

@@ -143,7 +143,7 @@ Result<void> ControlServer::Parts::make_guard() {
     spdlog::warn("identity '{}' expires in {} days: 'plcctl security renew {}'", own->subject.name,
                  left / std::time_t{86'400}, own->subject.name);
   }
-  guard.replace(std::move(*known));
+  guard.replace(std::move(known));
   return {};
 }
 

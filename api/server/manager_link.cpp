@@ -10,9 +10,9 @@
 namespace plchost {
 
 Result<ManagerLink> ManagerLink::connect(const std::string& run_directory) {
-  auto socket = PacketSocket::connect(run_directory + "/manager.sock");
-  if (!socket) return failure_in("cannot reach the manager", socket.error());
-  return ManagerLink(std::move(*socket));
+  PLCHOST_TRY_ASSIGN(auto socket, in_step("cannot reach the manager",
+                                          PacketSocket::connect(run_directory + "/manager.sock")));
+  return ManagerLink(std::move(socket));
 }
 
 Result<void> ManagerLink::send(ControlRequest request, PendingCommand command) {
@@ -24,8 +24,7 @@ Result<void> ManagerLink::send(ControlRequest request, PendingCommand command) {
                                pending_.size(), of_client, kMaxPending, kMaxPendingOfClient));
   }
   request.number = next_number_++;
-  if (auto sent = socket_.send(encode(request)); !sent)
-    return failure_in("cannot pass the command to the manager", sent.error());
+  PLCHOST_TRY(in_step("cannot pass the command to the manager", socket_.send(encode(request))));
   pending_.emplace(request.number, std::move(command));
   return {};
 }

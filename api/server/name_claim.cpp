@@ -75,15 +75,17 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
       .machine = fmt::format("{}, process {}, {}", machine_name(), ::getpid(), options.run_directory)};
   const std::string partition = dds::name_partition(options.host);
   const dds::Qos qos = dds::qos_of(dds::kNameClaim);
-  auto subscriber = dds::make_subscriber(participant, partition);
-  if (!subscriber) return failure_in("cannot claim the host's name", std::move(subscriber).error());
-  auto claims = dds::open_reader(participant, subscriber->get(), dds::kNameClaim, qos);
-  if (!claims) return failure_in("cannot claim the host's name", std::move(claims).error());
-  auto own_claim = dds::open_writer(participant, partition, claims->topic.get(), qos);
-  if (!own_claim) return failure_in("cannot claim the host's name", std::move(own_claim).error());
-  claim.subscriber_ = *std::move(subscriber);
-  claim.claims_ = *std::move(claims);
-  claim.own_claim_ = *std::move(own_claim);
+  PLCHOST_TRY_ASSIGN(auto subscriber,
+                     in_step("cannot claim the host's name", dds::make_subscriber(participant, partition)));
+  PLCHOST_TRY_ASSIGN(auto claims,
+                     in_step("cannot claim the host's name",
+                             dds::open_reader(participant, subscriber.get(), dds::kNameClaim, qos)));
+  PLCHOST_TRY_ASSIGN(auto own_claim,
+                     in_step("cannot claim the host's name",
+                             dds::open_writer(participant, partition, claims.topic.get(), qos)));
+  claim.subscriber_ = std::move(subscriber);
+  claim.claims_ = std::move(claims);
+  claim.own_claim_ = std::move(own_claim);
   PLCHOST_TRY(claim.write());
   return claim;
 }

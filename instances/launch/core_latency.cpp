@@ -163,8 +163,7 @@ std::string leave(const std::string& sysfs, const std::string& run_directory, in
 Result<CoreLatencyHold> CoreLatencyHold::take(const std::string& sysfs, const std::string& run_directory,
                                               int core) {
   const std::string file = latency_file(sysfs, core);
-  const auto entered = enter_soon(run_directory);
-  if (!entered) return std::unexpected(entered.error());
+  PLCHOST_TRY_ASSIGN(const auto entered, enter_soon(run_directory));
   PLCHOST_TRY_ASSIGN(const auto before, read_latency(file));
   PLCHOST_TRY_ASSIGN(auto record, make_record(run_directory, core, before));
   auto written = write_latency(file, kNoLatency);

@@ -47,10 +47,7 @@ Result<UniqueFd> start_heartbeat() {
   if (!fd) return failure(ErrorCode::system, "cannot create a timer", errno);
   const timespec interval = to_timespec(Duration(Instance::kHeartbeat));
   const itimerspec timer{.it_interval = interval, .it_value = interval};
-  if (const auto set = check_errno(::timerfd_settime(fd.get(), 0, &timer, nullptr), "cannot set a timer");
-      !set) {
-    return std::unexpected(set.error());
-  }
+  PLCHOST_TRY(check_errno(::timerfd_settime(fd.get(), 0, &timer, nullptr), "cannot set a timer"));
   return fd;
 }
 

@@ -34,10 +34,9 @@ Result<std::unique_ptr<CommandServer>> CommandServer::open(Reactor& reactor, con
   PLCHOST_TRY_ASSIGN(auto listener, PacketListener::listen(path));
   std::unique_ptr<CommandServer> server(
       new CommandServer(reactor, std::move(listener), handler));  // NOLINT: the constructor is private
-  auto watch =
-      reactor.watch(server->listener_.fd(), EPOLLIN, [sut = server.get()](std::uint32_t) { sut->accept(); });
-  if (!watch) return std::unexpected(watch.error());
-  server->listen_watch_ = std::move(*watch);
+  PLCHOST_TRY_ASSIGN(
+      server->listen_watch_,
+      reactor.watch(server->listener_.fd(), EPOLLIN, [sut = server.get()](std::uint32_t) { sut->accept(); }));
   return server;
 }
 

@@ -107,7 +107,7 @@ Result<std::string> ConfigReload::take_over() {
     in_time = waiting.reply ? check_in_time(waiting.request.limit_ns) : Result<void>();
     if (in_time) break;
   }
-  if (!in_time) return std::unexpected(in_time.error());
+  PLCHOST_TRY(in_time);
   PLCHOST_TRY_ASSIGN(const auto lines, apply_());
   for (const std::string& line : lines) spdlog::info("reload: {}", line);
   return lines.empty() ? "nothing has changed" : join_lines(lines, "the log of plchostd");

@@ -116,8 +116,8 @@ Result<void> copy_file(const StoreOrder& order, const std::string& path) {
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, file_mode(order)));
   if (!to) return failure(ErrorCode::system, "cannot open " + path, errno);
   if (auto copied = copy_checked(order, from.get(), to.get(), path); !copied) return copied;
-  const auto synced = check_errno(::fsync(to.get()), "cannot sync " + path);
-  return synced ? Result<void>() : std::unexpected(synced.error());
+  PLCHOST_TRY(check_errno(::fsync(to.get()), "cannot sync " + path));
+  return {};
 }
 
 /// In place, for good, but not a version before it has its description.
@@ -219,8 +219,8 @@ Result<std::string> set_boot(const StoreOrder& order) {
     std::error_code error;
     std::filesystem::remove(boot_path(order.folder), error);
     if (error) return failure(ErrorCode::system, "cannot remove " + boot_path(order.folder), error.value());
-  } else if (auto written = replace_file(boot_path(order.folder), order.boot, file_mode(order)); !written) {
-    return std::unexpected(written.error());
+  } else {
+    PLCHOST_TRY(replace_file(boot_path(order.folder), order.boot, file_mode(order)));
   }
   PLCHOST_TRY(sync_directory(order.folder));
   return order.boot;
@@ -236,7 +236,7 @@ int store_main(std::string_view order) {
   const auto read = decode_store_order(order);
   // Nobody would hear of what it has kept: its manager is gone, or has given it up.
   if (read && !end_with_parent(read->parent, SIGKILL)) return static_cast<int>(ErrorCode::unavailable);
-  const auto done = read ? carry_out(*read) : Result<std::string>(std::unexpected(read.error()));
+  const auto done = and_then(read, carry_out);
   fmt::print("{}", done ? *done : done.error().describe());
   return done ? 0 : static_cast<int>(done.error().code);
 }

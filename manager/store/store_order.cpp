@@ -55,10 +55,8 @@ Result<StoreOrder> decode_store_order(std::string_view text) {
     }
     order.*member.member = found->get<std::string>();
   }
-  const auto size = order_number(json, "size", std::numeric_limits<std::uint64_t>::max());
-  const auto keep = order_number(json, "keep", std::numeric_limits<std::uint32_t>::max());
-  if (!size) return std::unexpected(size.error());
-  if (!keep) return std::unexpected(keep.error());
+  PLCHOST_TRY_ASSIGN(const auto size, order_number(json, "size", std::numeric_limits<std::uint64_t>::max()));
+  PLCHOST_TRY_ASSIGN(const auto keep, order_number(json, "keep", std::numeric_limits<std::uint32_t>::max()));
   PLCHOST_TRY_ASSIGN(const auto parent,
                      order_number(json, "parent", std::numeric_limits<std::int32_t>::max()));
   const auto trial = json.find("trial");
@@ -68,8 +66,8 @@ Result<StoreOrder> decode_store_order(std::string_view text) {
   }
   order.trial = trial->get<std::vector<std::string>>();
   order.parent = static_cast<pid_t>(parent);
-  order.size = *size;
-  order.keep = static_cast<std::uint32_t>(*keep);
+  order.size = size;
+  order.keep = static_cast<std::uint32_t>(keep);
   return order;
 }
 

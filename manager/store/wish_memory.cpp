@@ -64,7 +64,7 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
   };
   auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything, mark, kWishRights);
   if (!memory && damaged) return failure(ErrorCode::corrupt, memory.error().describe());
-  if (!memory) return std::unexpected(std::move(memory).error());
+  PLCHOST_TRY(memory);
   WishMemory opened(name, *std::move(memory));
   Found found = opened.newest();
   opened.generation_ = found.generation;

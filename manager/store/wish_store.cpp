@@ -78,7 +78,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   }
   auto remembered = memory_ ? memory_->read() : std::nullopt;
   const auto file = read_file(path(), kMaxWishBytes, remembered ? kWishReadLimit : kOnlyWishReadLimit);
-  auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
+  auto wish = and_then(file, decode_wish);
   if (file) wanted_ = written_ = *file;
   if (wish) {
     number_ = std::exchange(wish->number, 0);
@@ -136,9 +136,9 @@ Result<std::optional<InstanceWish>> WishStore::take_remembered(InstanceWish reme
 }
 
 Result<std::string> WishStore::read_file(const std::string& path, std::size_t most, Duration limit) const {
-  const auto text =
-      disk_.ask<Result<std::string>>(limit, path, [path, most] { return read_wish_file(path, most); });
-  return text ? *text : std::unexpected(text.error());
+  PLCHOST_TRY_ASSIGN(auto text, disk_.ask<Result<std::string>>(
+                                    limit, path, [path, most] { return read_wish_file(path, most); }));
+  return text;
 }
 
 // The files that instances read are in the run directory, which a power cut empties.
@@ -149,7 +149,7 @@ void WishStore::restore_events() const {
   if (std::filesystem::exists(registered, error)) return;
   const auto kept = read_file(events_path(), kMostBytes, kWishReadLimit);
   if (!kept && kept.error().code == ErrorCode::not_found) return;
-  const auto restored = kept ? replace_file(registered, *kept) : std::unexpected(kept.error());
+  const auto restored = and_then(kept, [&](const auto& text) { return replace_file(registered, text); });
   if (!restored) {
     spdlog::error("instance {}: the events that operators registered are not restored: {}",
                   settings_.instance, restored.error().describe());

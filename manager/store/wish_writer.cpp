@@ -101,16 +101,15 @@ Result<void> WishWriter::write(const WishOrder& order, Done done) {
 Result<void> WishWriter::start() {
   if (process_) return failure(ErrorCode::busy, "the helper that writes to the disk is ending");
   PLCHOST_TRY_ASSIGN(auto channel, make_report_channel());
-  auto process =
-      spawn_process({.arguments = {helper_, kWishWriterOption}, .report_fd = channel.childs.get()});
-  if (!process) return std::unexpected(process.error());
-  auto exit_watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
+  PLCHOST_TRY_ASSIGN(auto process, spawn_process({.arguments = {helper_, kWishWriterOption},
+                                                  .report_fd = channel.childs.get()}));
+  auto exit_watch = reactor_.watch(process.pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
   auto link_watch = reactor_.watch(channel.ours.fd(), EPOLLIN, [this](std::uint32_t) { read_answers(); });
   if (!exit_watch || !link_watch) {
-    (void)signal_process(*process, SIGKILL);
+    (void)signal_process(process, SIGKILL);
     return std::unexpected(exit_watch ? link_watch.error() : exit_watch.error());
   }
-  process_ = std::move(*process);
+  process_ = std::move(process);
   exit_watch_ = std::move(*exit_watch);
   link_ = std::move(channel.ours);
   link_watch_ = std::move(*link_watch);

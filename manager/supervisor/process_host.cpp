@@ -35,7 +35,7 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   const int pid = process.pid;
   output_.say(LogLevel::info, pid, fmt::format("process {} was started", pid));
   auto watch = reactor_.watch(channel.ours.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
-  auto followed = watch ? follow(process) : Result<void>(std::unexpected(watch.error()));
+  auto followed = and_then(watch, [&](const auto& /*watching*/) { return follow(process); });
   if (!followed) {  // it cannot be supervised, so it must not go on
     kill_and_reap(process);
     return std::unexpected(followed.error());

@@ -29,9 +29,8 @@ class DiskThread {
   template <class Answer>
   [[nodiscard]] Result<Answer> ask(Duration limit, const std::string& what, std::function<Answer()> work) {
     const auto answer = std::make_shared<std::unique_ptr<Answer>>();
-    auto done =
-        within(limit, what, [answer, work = std::move(work)] { *answer = std::make_unique<Answer>(work()); });
-    if (!done) return std::unexpected(std::move(done).error());
+    PLCHOST_TRY(within(limit, what,
+                       [answer, work = std::move(work)] { *answer = std::make_unique<Answer>(work()); }));
     return std::move(**answer);
   }
 

@@ -28,9 +28,8 @@ void Reactor::Watch::reset() noexcept {
 
 Result<void> Reactor::Watch::change(std::uint32_t epoll_events) {
   epoll_event event{.events = epoll_events, .data = {.u64 = id_}};
-  const auto done =
-      check_errno(::epoll_ctl(reactor_->epoll_.get(), EPOLL_CTL_MOD, fd_, &event), "cannot change a watch");
-  if (!done) return std::unexpected(done.error());
+  PLCHOST_TRY(
+      check_errno(::epoll_ctl(reactor_->epoll_.get(), EPOLL_CTL_MOD, fd_, &event), "cannot change a watch"));
   return {};
 }
 
@@ -77,14 +76,13 @@ Result<void> Reactor::watch_signals(std::initializer_list<int> signals, std::fun
   PLCHOST_TRY_ASSIGN(auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK),
                                           "cannot create a signal descriptor"));
   signal_fd_ = UniqueFd(fd);
-  auto added = watch(fd, EPOLLIN, [this, received = std::move(received)](std::uint32_t) {
+  const auto read_all = [this, received = std::move(received)](std::uint32_t) {
     signalfd_siginfo info{};
     while (::read(signal_fd_.get(), &info, sizeof info) == sizeof info) {
       received(static_cast<int>(info.ssi_signo));
     }
-  });
-  if (!added) return std::unexpected(added.error());
-  signal_watch_ = std::move(*added);
+  };
+  PLCHOST_TRY_ASSIGN(signal_watch_, watch(fd, EPOLLIN, read_all));
   return {};
 }
 

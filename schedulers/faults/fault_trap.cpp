@@ -213,16 +213,11 @@ Result<void> install_fault_handlers() {
   ::sigfillset(&action.sa_mask);
   action.sa_sigaction = &FaultHandlers::on_fault;
   for (const int signal : kFaultSignals) {
-    if (const auto set =
-            check_errno(::sigaction(signal, &action, nullptr), "cannot catch " + signal_name(signal));
-        !set)
-      return std::unexpected(set.error());
+    PLCHOST_TRY(check_errno(::sigaction(signal, &action, nullptr), "cannot catch " + signal_name(signal)));
   }
   action.sa_sigaction = &FaultHandlers::on_watchdog;
-  if (const auto set =
-          check_errno(::sigaction(watchdog_signal(), &action, nullptr), "cannot catch the watchdog's signal");
-      !set)
-    return std::unexpected(set.error());
+  PLCHOST_TRY(
+      check_errno(::sigaction(watchdog_signal(), &action, nullptr), "cannot catch the watchdog's signal"));
   installed.store(true, std::memory_order_release);
   return ProcessorGuard::install();
 }

@@ -58,4 +58,11 @@ std::unexpected<Error> failure_in(std::string_view step, Error error) {
   return std::unexpected(std::move(error));
 }
 
+Result<bool> if_found(Result<void> result) {
+  if (!result && result.error().code != ErrorCode::not_found) {
+    return std::unexpected(std::move(result).error());
+  }
+  return result.has_value();
+}
+
 }  // namespace plchost

@@ -2,8 +2,11 @@
 
 #include <cstdint>
 #include <expected>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 namespace plchost {
@@ -48,6 +51,40 @@ using Result = std::expected<T, Error>;
 
 /// Passes another function's failure on, with the step that it happened in put before its message.
 [[nodiscard]] std::unexpected<Error> failure_in(std::string_view step, Error error);
+
+/// The same as a call that PLCHOST_TRY takes: `PLCHOST_TRY(in_step("gateway", open_node()));`. A step that
+/// takes time to write, and is written for each of many, is better passed to failure_in().
+template <class T>
+[[nodiscard]] Result<T> in_step(std::string_view step, Result<T> result) {
+  if (!result) return failure_in(step, std::move(result).error());
+  return result;
+}
+
+/// `use` with the value, and its Result; or the failure. As std::expected::and_then, which GCC 12 lacks.
+template <class Given, class Use>
+[[nodiscard]] auto and_then(Given&& result, Use&& use) {
+  if constexpr (std::is_void_v<typename std::remove_cvref_t<Given>::value_type>) {
+    using Next = std::invoke_result_t<Use>;
+    return result ? Next(std::invoke(std::forward<Use>(use)))
+                  : Next(std::unexpect, std::forward<Given>(result).error());
+  } else {
+    using Next = std::invoke_result_t<Use, decltype(*std::forward<Given>(result))>;
+    return result ? Next(std::invoke(std::forward<Use>(use), *std::forward<Given>(result)))
+                  : Next(std::unexpect, std::forward<Given>(result).error());
+  }
+}
+
+/// For what need not be there: the failure not_found becomes an empty optional, every other one stays.
+/// `PLCHOST_TRY_ASSIGN(const auto event, if_found(pool.open_event(name)));`
+template <class T>
+[[nodiscard]] Result<std::optional<T>> if_found(Result<T> result) {
+  if (result) return std::optional<T>(*std::move(result));
+  if (result.error().code == ErrorCode::not_found) return std::optional<T>();
+  return std::unexpected(std::move(result).error());
+}
+
+/// The same of a call without a value: whether it was there.
+[[nodiscard]] Result<bool> if_found(Result<void> result);
 
 }  // namespace plchost
 

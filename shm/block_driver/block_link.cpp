@@ -34,22 +34,22 @@ Result<LinkMemory> LinkMemory::make(const std::string& name, const NodeLife& fro
     describe_page(layout, kLinkKind, bytes.size());
     return {};
   };
-  auto file = MemoryFile::replace(name, link_size(slots), fill);
-  if (!file) return failure_in("link between nodes", std::move(file).error());
-  return LinkMemory(*std::move(file), slots);
+  PLCHOST_TRY_ASSIGN(auto file,
+                     in_step("link between nodes", MemoryFile::replace(name, link_size(slots), fill)));
+  return LinkMemory(std::move(file), slots);
 }
 
 Result<LinkMemory> LinkMemory::open(const std::string& name, MemoryFile::Access access) {
-  auto file = open_page<LinkLayout>(name, kLinkKind, access);
-  if (!file) return failure_in("link between nodes", std::move(file).error());
-  const LinkLayout& layout = layout_of(*file);
+  PLCHOST_TRY_ASSIGN(auto file,
+                     in_step("link between nodes", open_page<LinkLayout>(name, kLinkKind, access)));
+  const LinkLayout& layout = layout_of(file);
   const std::uint32_t slots = layout.slots;
-  if (!is_ring_size(slots) || file->bytes().size() != link_size(slots)) {
+  if (!is_ring_size(slots) || file.bytes().size() != link_size(slots)) {
     return failure(ErrorCode::corrupt, fmt::format("link between nodes '{}' says {} slots; this does not fit "
                                                    "its size of {} bytes",
-                                                   name, slots, file->bytes().size()));
+                                                   name, slots, file.bytes().size()));
   }
-  return LinkMemory(*std::move(file), slots);
+  return LinkMemory(std::move(file), slots);
 }
 
 Result<LinkMemory> LinkMemory::open(const std::string& name, const NodeLife& from, const NodeLife& to) {

@@ -80,8 +80,7 @@ Result<void> mend_header(const MemoryFile& file, const std::string& name) {
   if (file.bytes().size() != sizeof(DirectoryLayout)) return check_directory(file, name);
   const TimePoint deadline = MonotonicClock::now() + kMendPatience;
   while (!has_good_header(directory_in(file))) {
-    const auto lock = DirectoryLock::acquire(name);
-    if (!lock) return std::unexpected(lock.error());
+    PLCHOST_TRY_ASSIGN(const auto lock, DirectoryLock::acquire(name));
     if (!has_live_node(directory_in(file))) return fill_directory(file.bytes());
     if (MonotonicClock::now() >= deadline) return check_directory(file, name);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -98,19 +97,19 @@ Result<void> check_base(std::string_view base) {
 Result<NodeDirectory> NodeDirectory::open(std::string_view pool, std::string_view base) {
   PLCHOST_TRY(check_base(base));
   const std::string name = directory_name(pool, base);
-  auto file = open_or_make_directory(name);
-  if (!file) return failure_in("directory of nodes", std::move(file).error());
-  PLCHOST_TRY(mend_header(*file, name));
-  return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
+  PLCHOST_TRY_ASSIGN(auto file, in_step("directory of nodes", open_or_make_directory(name)));
+  PLCHOST_TRY(mend_header(file, name));
+  return NodeDirectory(std::string(pool), std::string(base), std::move(file));
 }
 
 Result<NodeDirectory> NodeDirectory::open_to_read(std::string_view pool, std::string_view base) {
   PLCHOST_TRY(check_base(base));
   const std::string name = directory_name(pool, base);
-  auto file = MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_only);
-  if (!file) return failure_in("directory of nodes", std::move(file).error());
-  PLCHOST_TRY(check_directory(*file, name));
-  return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
+  PLCHOST_TRY_ASSIGN(auto file,
+                     in_step("directory of nodes",
+                             MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_only)));
+  PLCHOST_TRY(check_directory(file, name));
+  return NodeDirectory(std::string(pool), std::string(base), std::move(file));
 }
 
 void NodeDirectory::remove(std::string_view pool, std::string_view base) noexcept {
@@ -255,8 +254,8 @@ Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
                    fmt::format("queues of {} slots are not possible: a power of two from {} to {} is",
                                entry.queue_slots, kMinRingSlots, kMaxRingSlots));
   }
-  const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
-  if (!lock) return failure_in("cannot join the directory of nodes", lock.error());
+  PLCHOST_TRY_ASSIGN(const auto lock, in_step("cannot join the directory of nodes",
+                                              DirectoryLock::acquire(directory_name(pool_, base_))));
   reclaim_locked();
   PLCHOST_TRY_ASSIGN(const auto node, choose(entry));
   NodeSlot& place = slot(node);

@@ -49,9 +49,9 @@ RemoteNamesLayout& RemoteNames::layout() const noexcept {
 
 Result<RemoteNames> RemoteNames::open(std::string_view pool, std::string_view base) {
   const std::string name = pool_memory_name(pool, fmt::format("{}.hosts", base));
-  auto file = open_or_make_page<RemoteNamesLayout>(name, kRemoteNames, Replaces::foreign);
-  if (!file) return failure_in("nodes of other hosts", std::move(file).error());
-  return RemoteNames(*std::move(file));
+  PLCHOST_TRY_ASSIGN(auto file, in_step("nodes of other hosts", open_or_make_page<RemoteNamesLayout>(
+                                                                    name, kRemoteNames, Replaces::foreign)));
+  return RemoteNames(std::move(file));
 }
 
 void RemoteNames::write(std::span<const RemoteNode> nodes) noexcept {

@@ -202,10 +202,9 @@ Result<void> BlockRouter::connect(std::uint16_t node) {
     return failure(ErrorCode::unavailable, fmt::format("node {} is no neighbour (any more)", node));
   }
   const NodeLife& to = lives_[node - 1U];
-  auto memory =
-      LinkMemory::make(node_.directory_.link(self, node), node_.life_, to, node_.options_.entry.queue_slots);
-  if (!memory) return std::unexpected(std::move(memory).error());
-  if (!node_.out_[node - 1U].exchange(std::make_unique<OutLink>(*std::move(memory), to))) {
+  PLCHOST_TRY_ASSIGN(auto memory, LinkMemory::make(node_.directory_.link(self, node), node_.life_, to,
+                                                   node_.options_.entry.queue_slots));
+  if (!node_.out_[node - 1U].exchange(std::make_unique<OutLink>(std::move(memory), to))) {
     return failure(ErrorCode::busy,
                    fmt::format("tasks of this process are still in the last links to node {}", node));
   }

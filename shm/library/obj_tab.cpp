@@ -161,7 +161,8 @@ Result<objTab_t*> ObjTab::look() {
 // Where it fails, the table is as it was; only one that was never listed has nothing to show.
 Result<void> ObjTab::refresh() {
   const auto all = pool_.list();
-  if (!all) return listed_ ? Result<void>() : std::unexpected(all.error());
+  if (!all && listed_) return {};
+  PLCHOST_TRY(all);
   std::map<std::pair<std::string, ObjectType>, std::unique_ptr<Row>> before;
   for (auto& row : rows_) before[{row->name, row->type}] = std::move(row);
   rows_.clear();

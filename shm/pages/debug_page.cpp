@@ -62,7 +62,7 @@ Result<DebugPart> read_debug_part(std::string_view pool, std::string_view instan
                     "application --debug'",
                     instance));
   }
-  if (!memory) return std::unexpected(std::move(memory).error());
+  PLCHOST_TRY(memory);
   auto& page = *reinterpret_cast<DebugPageLayout*>(memory->bytes().data());
   if (query.session != 0) {
     page.asked_ns.store(MonotonicClock::now().time_since_epoch().count(), std::memory_order_relaxed);

@@ -157,10 +157,10 @@ bool HostPageWriter::keep() {
 }
 
 Result<HostPageReader> HostPageReader::open(std::string_view pool) {
-  auto memory = open_fixed_page<HostPageLayout>(host_page_name(pool), kHostPageKind,
-                                                MemoryFile::Access::read_only, is_own_or_roots);
-  if (!memory) return std::unexpected(memory.error());
-  return HostPageReader(std::move(*memory));
+  PLCHOST_TRY_ASSIGN(auto memory,
+                     open_fixed_page<HostPageLayout>(host_page_name(pool), kHostPageKind,
+                                                     MemoryFile::Access::read_only, is_own_or_roots));
+  return HostPageReader(std::move(memory));
 }
 
 std::uint64_t HostPageReader::changes() const noexcept {

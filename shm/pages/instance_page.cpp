@@ -139,11 +139,11 @@ Result<InstancePage> InstancePage::create(std::string_view pool, std::string_vie
         fmt::format("instance '{}' has {} tasks; at most {} are allowed", instance, tasks.size(), kMaxTasks));
   }
   const HistogramShape shape = shape_for(tasks.size(), fine_tasks);
-  auto memory = MemoryFile::replace(
-      instance_page_name(pool, instance), size_for(tasks.size(), shape),
-      [&](std::span<std::byte> bytes) { return fill_instance_page(bytes, tasks, shape); });
-  if (!memory) return std::unexpected(memory.error());
-  return InstancePage(std::move(*memory), tasks, shape);
+  PLCHOST_TRY_ASSIGN(
+      auto memory, MemoryFile::replace(
+                       instance_page_name(pool, instance), size_for(tasks.size(), shape),
+                       [&](std::span<std::byte> bytes) { return fill_instance_page(bytes, tasks, shape); }));
+  return InstancePage(std::move(memory), tasks, shape);
 }
 
 InstancePage::InstancePage(MemoryFile memory, std::span<const TaskIdentity> tasks, HistogramShape shape)

@@ -145,13 +145,11 @@ Result<OutputsPage> OutputsPage::create(std::string_view pool, std::string_view 
                                long_one->device.size(), kMaxPath));
   }
   const std::string name = outputs_page_name(pool, instance);
-  const auto made = MemoryFile::replace(name, bytes_for(outputs),
-                                        [&](std::span<std::byte> bytes) -> Result<void> {
-                                          fill_outputs(bytes, outputs);
-                                          return {};
-                                        },
-                                        {.mode = 0600});
-  if (!made) return std::unexpected(made.error());
+  const auto fill = [&](std::span<std::byte> bytes) -> Result<void> {
+    fill_outputs(bytes, outputs);
+    return {};
+  };
+  PLCHOST_TRY(MemoryFile::replace(name, bytes_for(outputs), fill, {.mode = 0600}));
   return OutputsPage(name);
 }
 

@@ -49,17 +49,18 @@ Result<void> check_reference_name(std::string_view name) {
 Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, std::string_view name) {
   PLCHOST_TRY(check_reference_name(name));
   const std::string file = pool_memory_name(pool, name);
-  auto memory = open_or_make_record(file, [&](uid_t user) { return may_own_memory(pool, user); });
-  if (!memory) return failure_in(fmt::format("reference clock '{}'", name), std::move(memory).error());
+  const auto may_own = [&](uid_t user) { return may_own_memory(pool, user); };
+  PLCHOST_TRY_ASSIGN(auto memory,
+                     in_step(fmt::format("reference clock '{}'", name), open_or_make_record(file, may_own)));
   const auto refused = [&] {
     return failure(ErrorCode::corrupt,
                    fmt::format("reference clock '{}': shared memory {} is no reference record of version {}; "
                                "remove it, or choose another name",
                                name, file, PLC_REFERENCE_CLOCK_VERSION));
   };
-  if (memory->bytes().size() != sizeof(plc_reference_clock)) return refused();
+  if (memory.bytes().size() != sizeof(plc_reference_clock)) return refused();
   const Identity identity = identity_of(file);
-  ReferenceClockRecord opened(*std::move(memory), file, identity);
+  ReferenceClockRecord opened(std::move(memory), file, identity);
   plc_reference_clock& record = opened.record();
   // Made by firmware that ended before it had written the first line, or emptied by a stranger.
   if (__atomic_load_n(&record.magic, __ATOMIC_ACQUIRE) == 0) plc_reference_clock_begin(&record);

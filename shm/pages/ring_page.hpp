@@ -74,7 +74,7 @@ class RingPage {
  private:
   explicit RingPage(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
   [[nodiscard]] static Result<RingPage> of(Result<MemoryFile> memory) {
-    if (!memory) return std::unexpected(std::move(memory).error());
+    PLCHOST_TRY(memory);
     return RingPage(*std::move(memory));
   }
   static void begin(Layout& ring) noexcept { ring.stream_unix_ns = unix_time_ns(); }

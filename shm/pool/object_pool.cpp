@@ -204,14 +204,14 @@ Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access 
   const std::uint64_t size = memory.entry().size.load(kRelaxed);
   // The file that the object was made with, or found with, not one that somebody has put in its place.
   const uid_t owner = memory.entry().owner.load(kRelaxed);
-  auto file = MemoryFile::open(pool_memory_name(name(), wanted.name), 1, access,
-                               [owner](uid_t user) { return user == owner; });
-  if (!file) return failure_in(fmt::format("memory '{}'", wanted.name), std::move(file).error());
-  if (file->bytes().size() != size) {
+  PLCHOST_TRY_ASSIGN(auto file, in_step(fmt::format("memory '{}'", wanted.name),
+                                        MemoryFile::open(pool_memory_name(name(), wanted.name), 1, access,
+                                                         [owner](uid_t user) { return user == owner; })));
+  if (file.bytes().size() != size) {
     return failure(ErrorCode::corrupt, fmt::format("memory '{}' has {} bytes, and its file {}: remove it",
-                                                   wanted.name, size, file->bytes().size()));
+                                                   wanted.name, size, file.bytes().size()));
   }
-  memory.memory_ = *std::move(file);
+  memory.memory_ = std::move(file);
   return {};
 }
 
@@ -242,12 +242,10 @@ Result<bool> ObjectPool::create_locked(PoolObject& object, const Wanted& wanted,
   ObjectEntry* entry = segment_->find(held, wanted.name);
   bool made = entry == nullptr;
   if (entry != nullptr && wanted.type == ObjectType::memory && PoolAdoption::is_left_over(*entry)) {
-    const auto left =
-        PoolAdoption::use_again(*segment_, held, *entry, wanted.initial, rights_for(options, name()),
-                                attributes_for(options, wanted.type));
-    if (!left) return std::unexpected(left.error());
+    PLCHOST_TRY_ASSIGN(
+        entry, PoolAdoption::use_again(*segment_, held, *entry, wanted.initial, rights_for(options, name()),
+                                       attributes_for(options, wanted.type)));
     made = true;
-    entry = *left;
   }
   if (entry == nullptr) {
     PLCHOST_TRY_ASSIGN(entry, make_entry(held, wanted, options, memory));
@@ -286,9 +284,8 @@ Result<Created<SharedMemory>> ObjectPool::create_memory(std::string_view name, s
 Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& wanted,
                                             const ObjectOptions& options,
                                             std::span<const std::byte> contents) {
-  const auto there = open_into(object, wanted, Access::read_write);
+  PLCHOST_TRY_ASSIGN(const bool there, if_found(open_into(object, wanted, Access::read_write)));
   if (there) return false;
-  if (there.error().code != ErrorCode::not_found) return std::unexpected(there.error());
   // The host takes its time to find so many bytes: not with the lock held.
   PLCHOST_TRY_ASSIGN(auto unnamed, prepare_memory(wanted.name, wanted.initial, options));
   std::ranges::copy(contents, unnamed.bytes().begin());
@@ -383,7 +380,7 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMe
   // The one before is gone and this one is kept, so no room for a reference is no reason to fail.
   auto referred = refer(memory, &held, *made, wanted, Access::read_write);
   if (!referred) referred = refer(memory, nullptr, *made, wanted, Access::read_write);
-  if (!referred) return std::unexpected(std::move(referred).error());
+  PLCHOST_TRY(referred);
   memory.memory_ = prepared.take();
   return memory;
 }
@@ -423,8 +420,7 @@ Result<void> ObjectPool::look_in_parts(Look look, Take take) const {
       more = take(look_only(until, look));
       continue;
     }
-    const auto held = segment_->lock(first);
-    if (!held) return std::unexpected(held.error());
+    PLCHOST_TRY_ASSIGN(const auto held, segment_->lock(first));
     more = take(look());
   }
   return {};

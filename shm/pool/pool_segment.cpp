@@ -177,12 +177,13 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
     return pool;
   };
   const auto make = [&](bool /*replace*/) -> Result<std::shared_ptr<PoolSegment>> {
-    auto memory = MemoryFile::create(
-        name, pool_size(options.max_objects),
-        [&](std::span<std::byte> bytes) { return fill_header(bytes, options.max_objects); }, options.rights);
-    if (!memory) return std::unexpected(std::move(memory).error());
+    PLCHOST_TRY_ASSIGN(
+        auto memory, MemoryFile::create(
+                         name, pool_size(options.max_objects),
+                         [&](std::span<std::byte> bytes) { return fill_header(bytes, options.max_objects); },
+                         options.rights));
     return std::shared_ptr<PoolSegment>(
-        new PoolSegment(name, std::move(*memory), options.max_objects, Access::read_write));
+        new PoolSegment(name, std::move(memory), options.max_objects, Access::read_write));
   };
   return open_or_make(open, make, Replaces::nothing);
 }

@@ -115,9 +115,7 @@ Result<ControlRequest> decode_request(std::string_view packet) {
   const auto verb = text_of(json, "verb");
   const auto instance = text_of(json, "instance");
   const auto argument = text_of(json, "argument");
-  for (const auto* text : {&verb, &instance, &argument}) {
-    if (!*text) return std::unexpected(text->error());
-  }
+  for (const auto* text : {&verb, &instance, &argument}) PLCHOST_TRY(*text);
   PLCHOST_TRY_ASSIGN(auto options, options_of(json));
   PLCHOST_TRY_ASSIGN(const auto limit, limit_of(json));
   PLCHOST_TRY_ASSIGN(auto id, id_of(json));

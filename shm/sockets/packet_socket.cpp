@@ -132,10 +132,9 @@ Result<PacketListener> PacketListener::listen(const std::string& path) {
   ::unlink(path.c_str());
   constexpr mode_t kMode = 0660;
   constexpr int kBacklog = 16;
-  auto done = check_errno(::bind(fd.get(), as_sockaddr(address), sizeof address), "cannot bind " + path);
-  if (done) done = check_errno(::chmod(path.c_str(), kMode), "cannot set the rights of " + path);
-  if (done) done = check_errno(::listen(fd.get(), kBacklog), "cannot listen on " + path);
-  if (!done) return std::unexpected(done.error());
+  PLCHOST_TRY(check_errno(::bind(fd.get(), as_sockaddr(address), sizeof address), "cannot bind " + path));
+  PLCHOST_TRY(check_errno(::chmod(path.c_str(), kMode), "cannot set the rights of " + path));
+  PLCHOST_TRY(check_errno(::listen(fd.get(), kBacklog), "cannot listen on " + path));
   struct stat file{};
   PLCHOST_TRY(check_errno(::stat(path.c_str(), &file), "cannot examine " + path));
   return PacketListener(std::move(fd), path, file.st_ino);

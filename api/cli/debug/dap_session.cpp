@@ -219,9 +219,8 @@ DapSession::Answer DapSession::attach(const Json& arguments) {
 Result<void> DapSession::remove_of(const std::string& key) {
   std::vector<std::uint32_t>& ids = ids_[key];
   while (!ids.empty()) {
-    const auto done = link_.command(fmt::format("delete {}", ids.back()));
     // One whose place is gone since an online change is no more.
-    if (!done && done.error().code != ErrorCode::not_found) return std::unexpected(done.error());
+    PLCHOST_TRY(if_found(link_.command(fmt::format("delete {}", ids.back()))));
     news_.has_deleted(ids.back());
     ids.pop_back();
   }

@@ -89,8 +89,7 @@ DapSession::Answer DapSession::variables(const Json& arguments) {
   }
   const std::string instance = frame.value("instance", "");
   if (!instance.empty()) {
-    auto found = link_.variables(instance + ".*");
-    if (!found && found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
+    PLCHOST_TRY_ASSIGN(const auto found, if_found(link_.variables(instance + ".*")));
     if (found) {
       for (const auto& variable : *found) made.push_back(variable_json(variable, instance + "."));
     }

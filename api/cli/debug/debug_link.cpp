@@ -145,9 +145,8 @@ Result<ListedVariable> DebugLink::variable(const std::string& instance, const st
     // Such as an index out of the range of an own array.
     if (!own && own.error().code != ErrorCode::not_found) return std::unexpected(own.error());
   }
-  const auto found = variables(name);
+  PLCHOST_TRY_ASSIGN(const auto found, if_found(variables(name)));
   if (found && found->size() == 1) return found->front();
-  if (!found && found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
   std::vector<std::string> wholes{name};
   if (!instance.empty()) wholes.insert(wholes.begin(), fmt::format("{}.{}", instance, name));
   for (const std::string& whole : wholes) {

@@ -31,10 +31,7 @@ std::unexpected<Error> unknown_node(const std::string& name, const std::vector<N
 
 Result<Asked> look(const std::string& pool, const std::string& base, const NodeQuery& query) {
   Asked asked{.listing = {.base = base}, .directory = std::nullopt, .nodes = {}};
-  auto directory = NodeDirectory::open_to_read(pool, base);
-  if (!directory && directory.error().code != ErrorCode::not_found) {
-    return std::unexpected(std::move(directory).error());
-  }
+  PLCHOST_TRY_ASSIGN(auto directory, if_found(NodeDirectory::open_to_read(pool, base)));
   if (directory) {
     asked.listing.host_number =
         static_cast<std::uint16_t>(directory->layout().host_number.load(std::memory_order_relaxed));

@@ -170,17 +170,16 @@ std::optional<Result<VariableAnswer>> VariableLister::take(Pending& pending, Val
   using Done = Result<VariableAnswer>;
   const std::uint64_t number = reply.number;
   if (reply.code == ErrorCode::wrong_state) {
-    const auto renewed = renew(pending, number);
-    return renewed ? std::nullopt : std::optional(Done(std::unexpected(renewed.error())));
+    PLCHOST_TRY(renew(pending, number));
+    return std::nullopt;
   }
   if (reply.code != ErrorCode::ok) {
     return Done(failure(reply.code,
                         fmt::format("its process does not give these values ({})", to_string(reply.code))));
   }
   (pending.asked == ValueKind::forced ? pending.forced : pending.current) = std::move(reply);
-  const auto goes_on = go_on(pending, number);
-  if (!goes_on) return Done(std::unexpected(goes_on.error()));
-  if (*goes_on) return std::nullopt;
+  PLCHOST_TRY_ASSIGN(const bool goes_on, go_on(pending, number));
+  if (goes_on) return std::nullopt;
   const ValueReply none;
   const ValueReply& current = pending.current ? *pending.current : none;
   const ValueReply& forced = pending.forced ? *pending.forced : none;

@@ -18,11 +18,8 @@ Result<PoolEvent> EventDirectory::find_any(std::string_view instance, std::strin
     if (kept->second.valid()) return kept->second;
     kept_.erase(kept);
   }
-  const auto found = pool_->open_event(name_);
-  if (!found) {
-    if (found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
-    return failure(ErrorCode::not_found, fmt::format("no external event '{}'", name_));
-  }
+  PLCHOST_TRY_ASSIGN(const auto found, if_found(pool_->open_event(name_)));
+  if (!found) return failure(ErrorCode::not_found, fmt::format("no external event '{}'", name_));
   if (kept_.size() >= kMaxKept) kept_.clear();
   kept_.emplace(name_, *found);
   return *found;

@@ -55,15 +55,16 @@ std::string PostLedger::file_name(std::string_view pool) {
 
 Result<PostLedger> PostLedger::open(const ObjectPool& pool) {
   const std::string name = file_name(pool.name());
-  auto memory = open_or_make_page<LedgerLayout>(name, kLedgerKind, Replaces::anything);
-  if (!memory) return failure_in("cannot open the ledger of posts", memory.error());
-  const LockResult locked = layout_of(*memory).mutex.lock(MonotonicClock::now() + kLockPatience);
+  PLCHOST_TRY_ASSIGN(auto memory,
+                     in_step("cannot open the ledger of posts",
+                             open_or_make_page<LedgerLayout>(name, kLedgerKind, Replaces::anything)));
+  const LockResult locked = layout_of(memory).mutex.lock(MonotonicClock::now() + kLockPatience);
   if (locked != LockResult::locked && locked != LockResult::owner_died) {
     return failure(ErrorCode::busy, fmt::format("the ledger of posts '{}' is in use by thread {}; end the "
                                                 "API server that has it",
-                                                name, layout_of(*memory).mutex.owner()));
+                                                name, layout_of(memory).mutex.owner()));
   }
-  return PostLedger(std::move(*memory), pool);
+  return PostLedger(std::move(memory), pool);
 }
 
 PostLedger::PostLedger(MemoryFile memory, const ObjectPool& pool) : memory_(std::move(memory)), pool_(&pool) {

@@ -47,16 +47,17 @@ std::vector<ObjectInfo> published_events(std::vector<ObjectInfo> objects) {
 }  // namespace
 
 Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
-  auto publisher_of_status = dds::make_publisher(participant, dds::status_partition(source.host));
-  if (!publisher_of_status) return failure_in("cannot publish the status", publisher_of_status.error());
-  const dds_entity_t parent = publisher_of_status->get();
+  PLCHOST_TRY_ASSIGN(auto publisher_of_status,
+                     in_step("cannot publish the status",
+                             dds::make_publisher(participant, dds::status_partition(source.host))));
+  const dds_entity_t parent = publisher_of_status.get();
   const StatusSource writes{.host = source.host, .epoch = source.epoch};
-  auto tables = StatusTables::create(participant, parent, writes);
-  if (!tables) return failure_in("cannot publish the status", tables.error());
-  auto hosts = open_table<plc_HostStatus>(participant, parent, writes);
-  if (!hosts) return failure_in("cannot publish the status", hosts.error());
-  auto findings = open_table<plc_HostFinding>(participant, parent, writes);
-  if (!findings) return failure_in("cannot publish the status", findings.error());
+  PLCHOST_TRY_ASSIGN(auto tables,
+                     in_step("cannot publish the status", StatusTables::create(participant, parent, writes)));
+  PLCHOST_TRY_ASSIGN(auto hosts, in_step("cannot publish the status",
+                                         open_table<plc_HostStatus>(participant, parent, writes)));
+  PLCHOST_TRY_ASSIGN(auto findings, in_step("cannot publish the status",
+                                            open_table<plc_HostFinding>(participant, parent, writes)));
   auto statistics = dds::open_writer(participant, parent, dds::kTaskStatistics);
   auto presence = dds::open_writer(participant, parent, dds::kPresence);
   for (auto* made : {&statistics, &presence}) {
@@ -65,19 +66,19 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   PLCHOST_TRY_ASSIGN(
       auto transitions,
       TransitionPublisher::create(participant, parent, {source.host, source.pool->name(), source.epoch}));
-  StatusTables& of_topics = **tables;
-  StatusPublisher publisher(source, *std::move(tables),
+  StatusTables& of_topics = *tables;
+  StatusPublisher publisher(source, std::move(tables),
                             TaskWatch(source.pool->name(), of_topics.of<plc_TaskStatus>(),
                                       StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
                             ExceptionWatch(source.run_directory, of_topics.of<plc_ExceptionStatus>()),
                             std::move(transitions));
-  publisher.findings_ = *std::move(findings);
-  publisher.hosts_ = *std::move(hosts);
+  publisher.findings_ = std::move(findings);
+  publisher.hosts_ = std::move(hosts);
   publisher.writers_ = WriterWatch(of_topics.of<plc_WriterStatus>());
   publisher.applications_ =
       ApplicationWatch(source.applications_folder, of_topics.of<plc_ApplicationStatus>());
   publisher.presence_ = std::move(*presence);
-  publisher.publisher_ = *std::move(publisher_of_status);
+  publisher.publisher_ = std::move(publisher_of_status);
   PLCHOST_TRY(publisher.page_.wait(MonotonicClock::now() + kPageWait));
   return publisher;
 }

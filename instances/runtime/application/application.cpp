@@ -107,12 +107,9 @@ Result<Application> Application::built(SharedObject& object, const ApplicationDe
                    fmt::format("{}: plc_app_init called __sys__setup__tasks more than once", path));
   }
   TaskCodes codes;
-  auto tasks = build_tasks(*declaration.tasks, codes);
-  if (!tasks) return failure_in(path, std::move(tasks).error());
-  if (auto applied = apply_task_settings(declaration.task_options, *tasks); !applied) {
-    return failure_in(path, std::move(applied).error());
-  }
-  return Application(std::move(object), *declaration.tasks, *std::move(tasks), std::move(codes));
+  PLCHOST_TRY_ASSIGN(auto tasks, in_step(path, build_tasks(*declaration.tasks, codes)));
+  PLCHOST_TRY(in_step(path, apply_task_settings(declaration.task_options, tasks)));
+  return Application(std::move(object), *declaration.tasks, std::move(tasks), std::move(codes));
 }
 
 void Application::exchange(Application& next) noexcept {

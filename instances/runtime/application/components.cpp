@@ -45,9 +45,8 @@ Result<void> Components::call_all(const InitHook& hook) const {
 
 Result<void> Components::load(const std::vector<std::string>& files) {
   for (const std::string& file : files) {
-    auto object = SharedObject::load(file, kHookExport);
-    if (!object) return failure_in("component", std::move(object).error());
-    objects_.push_back(*std::move(object));
+    PLCHOST_TRY_ASSIGN(auto object, in_step("component", SharedObject::load(file, kHookExport)));
+    objects_.push_back(std::move(object));
   }
   return {};
 }

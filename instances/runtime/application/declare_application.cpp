@@ -39,8 +39,7 @@ Result<void> read_settings_of(const LaunchOptions& launch, StartSettings& start)
     settings = read_settings(start.file, files);
     start.texts = files.texts();
   }
-  if (!settings) return std::unexpected(std::move(settings).error());
-  start.settings = *std::move(settings);
+  PLCHOST_TRY_ASSIGN(start.settings, std::move(settings));
   return {};
 }
 

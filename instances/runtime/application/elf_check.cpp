@@ -227,8 +227,7 @@ Result<void> check_elf_can_leave(ElfBytes file) {
 }
 
 Result<void> check_elf_file(const std::string& path, std::span<const std::string_view> symbols) {
-  const auto bytes = read_program(path);
-  auto checked = bytes ? check_elf(*bytes, symbols) : Result<void>(std::unexpected(bytes.error()));
+  auto checked = and_then(read_program(path), [&](const auto& bytes) { return check_elf(bytes, symbols); });
   if (!checked) checked.error().message = fmt::format("{} {}", path, checked.error().message);
   return checked;
 }

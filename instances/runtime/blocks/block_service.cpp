@@ -54,13 +54,13 @@ Result<void> BlockService::join() {
     if (error.code == ErrorCode::already_exists) error.code = ErrorCode::busy;
     return failure_in("[CmpBlkDrvShm]", std::move(error));
   }
-  auto router = BlockRouter::create(**node);
-  if (!router) return failure_in("[CmpBlkDrvShm]", std::move(router).error());
-  auto thread = Thread::start("blocks", {}, [this, run = router->get()] { run->run(stop_); });
-  if (!thread) return failure_in("[CmpBlkDrvShm]", std::move(thread).error());
+  PLCHOST_TRY_ASSIGN(auto router, in_step("[CmpBlkDrvShm]", BlockRouter::create(**node)));
+  PLCHOST_TRY_ASSIGN(auto thread,
+                     in_step("[CmpBlkDrvShm]",
+                             Thread::start("blocks", {}, [this, run = router.get()] { run->run(stop_); })));
   node_ = *std::move(node);
-  router_ = *std::move(router);
-  thread_ = *std::move(thread);
+  router_ = std::move(router);
+  thread_ = std::move(thread);
   node_now_.store(node_.get(), std::memory_order_release);
   spdlog::info("node '{}' with address {}", instance_, to_string(node_->address()));
   return {};

@@ -146,9 +146,8 @@ class ConditionParser {
     if (parsed) {
       step.value = number_of(left.type, bytes);
     } else {
-      auto right = begins_a_name(word) ? variable(word) : Result<ValuePlace>(std::unexpect, parsed.error());
-      if (!right) return std::unexpected(std::move(right).error());
-      step.right = *right;
+      if (!begins_a_name(word)) return parsed;
+      PLCHOST_TRY_ASSIGN(step.right, variable(word));
       step.with_variable = true;
     }
     condition_.steps_.push_back(step);

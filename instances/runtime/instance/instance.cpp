@@ -150,25 +150,23 @@ Result<std::string> Instance::attach_pool() {
   if (!pool && managed && pool.error().code == ErrorCode::not_found) {
     pool = ObjectPool::create(options_.launch.pool);
   }
-  if (!pool) return std::unexpected(std::move(pool).error());
-  pool_.emplace(*std::move(pool));
+  PLCHOST_TRY_ASSIGN(pool_, std::move(pool));
   host_.emplace(options_.launch.name, &*pool_);
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
-  if (auto cleared = host_->events().clear_left_behind(); !cleared)
-    return failure_in("events of the process before", std::move(cleared).error());
+  PLCHOST_TRY(in_step("events of the process before", host_->events().clear_left_behind()));
   PLCHOST_TRY(prepare_host(start_, *host_));
   return {};
 }
 
 Result<std::string> Instance::open_control_socket() {
   if (options_.launch.run_directory.empty()) return {};
-  auto server =
+  PLCHOST_TRY_ASSIGN(
+      auto server,
       InstanceSocket::listen(instance_socket_path(options_.launch.run_directory, options_.launch.name),
                              [this](const ControlRequest& request, const InstanceSocket::Asker& asker) {
                                return handle(request, asker);
-                             });
-  if (!server) return std::unexpected(std::move(server).error());
-  control_.emplace(*std::move(server));
+                             }));
+  control_.emplace(std::move(server));
   PLCHOST_TRY_ASSIGN(auto values, ValueServer::listen(
                                       values_socket_path(options_.launch.run_directory, options_.launch.name),
                                       host_->variables()));
@@ -376,7 +374,7 @@ void Instance::look_after_page() {
   if (page_damages_ > 1 && now < page_told_ + kTellAgain) return;
   page_told_ = now;
   spdlog::warn(
-      "the page of this instance was written over by another program ({} times so far) and is written anew; "
+      "the page of this instance was written over by another program ({} so far) and is written anew; "
       "statistics of tasks may be wrong: reset them",
       page_damages_);
 }

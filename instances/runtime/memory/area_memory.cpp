@@ -111,9 +111,8 @@ Result<void> AreaMemory::check_device(const AreaSettings& settings) {
 }
 
 Result<bool> AreaMemory::check_pool(const ObjectPool& pool, const std::string& name, std::size_t bytes) {
-  const auto known = pool.look_at(name);
-  if (!known && known.error().code == ErrorCode::not_found) return false;
-  if (!known) return std::unexpected(known.error());
+  PLCHOST_TRY_ASSIGN(const auto known, if_found(pool.look_at(name)));
+  if (!known) return false;
   if (known->type != ObjectType::memory) {
     return failure(ErrorCode::wrong_type,
                    fmt::format("'{}' is no shared memory but a {}", name, to_string(known->type)));

@@ -135,8 +135,8 @@ Result<AreaPlan> plan_areas(std::span<const DeclaredArea> areas, std::span<const
         settings, [&](const AreaSettings& one) { return flags_match(areas[area].flags, one.flags); });
     if (match == settings.end()) {
       planner.put_anywhere(area);
-    } else if (auto put = planner.put_into(*match, area); !put) {
-      return std::unexpected(std::move(put).error());
+    } else {
+      PLCHOST_TRY(planner.put_into(*match, area));
     }
   }
   return std::move(planner.plan);

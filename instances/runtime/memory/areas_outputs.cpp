@@ -50,9 +50,9 @@ Result<void> Areas::make_outputs_page(const Environment& environment) {
     }
   }
   if (left.empty()) return {};
-  auto page = OutputsPage::create(environment.pool->name(), environment.instance, left);
-  if (!page) return failure_in("page of outputs", std::move(page).error());
-  outputs_page_.emplace(*std::move(page));
+  PLCHOST_TRY_ASSIGN(
+      outputs_page_,
+      in_step("page of outputs", OutputsPage::create(environment.pool->name(), environment.instance, left)));
   return {};
 }
 

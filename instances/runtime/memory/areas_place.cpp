@@ -85,8 +85,7 @@ Result<void> check_memory(const Areas::Environment& environment, const AreaSetti
   const auto there = AreaMemory::check_pool(*environment.pool, settings.object, bytes);
   if (!there) return failure_in(name_of(settings), not_this_memory(there.error(), first));
   if (*there || environment.room == nullptr) return {};
-  auto room = environment.room->take_memory(settings.object, bytes);
-  return room ? room : failure_in(name_of(settings), std::move(room).error());
+  return in_step(name_of(settings), environment.room->take_memory(settings.object, bytes));
 }
 
 // The old memory goes only when the new one is whole, so both need their bytes.
@@ -95,8 +94,8 @@ Result<void> check_retain(const Areas::Environment& environment, const RetainIma
   PLCHOST_TRY_ASSIGN(const auto fresh,
                      RetainKeeper::check(pool, environment.instance, retain, environment.retain));
   if (fresh == 0 || environment.room == nullptr) return {};
-  auto room = environment.room->take_memory(retain_memory_name(environment.instance), fresh);
-  return room ? room : failure_in("retain variables", std::move(room).error());
+  return in_step("retain variables",
+                 environment.room->take_memory(retain_memory_name(environment.instance), fresh));
 }
 
 // The settings are checked by their texts. But a file has many: symbolic and hard links, and that of a memory
@@ -219,8 +218,7 @@ Result<void> Areas::make_blocks(const Environment& environment) {
 Result<void> Areas::make_memory(const Environment& environment, Block& block, const AreaBlock& planned) {
   const DeclaredArea& first = first_of(planned);
   const auto take = [&](Result<AreaMemory> made) -> Result<void> {
-    if (!made) return std::unexpected(std::move(made).error());
-    block.memory = *std::move(made);
+    PLCHOST_TRY_ASSIGN(block.memory, std::move(made));
     return {};
   };
   if (planned.settings == nullptr) {
@@ -235,9 +233,10 @@ Result<void> Areas::make_memory(const Environment& environment, Block& block, co
   // An image says by its header that it is none yet.
   const std::span<const std::byte> contents =
       first.has_image() ? std::span<const std::byte>() : std::span<const std::byte>(block.initial);
-  auto made = AreaMemory::of_pool(*environment.pool, settings.object, bytes_in_pool(settings, first),
-                                  contents, first.is_output());
-  if (!made) return failure_in(name_of(settings), std::move(made).error());
+  PLCHOST_TRY_ASSIGN(
+      auto made, in_step(name_of(settings),
+                         AreaMemory::of_pool(*environment.pool, settings.object,
+                                             bytes_in_pool(settings, first), contents, first.is_output())));
   return take(std::move(made));
 }
 

@@ -57,9 +57,7 @@ Result<void> RetainFiles::take() {
     return failure(ErrorCode::system,
                    fmt::format("cannot create the folder for retain variables {}", directory_), error);
   }
-  if (auto ours = check_own_folder(directory_); !ours) {
-    return failure_in("folder for retain variables", ours.error());
-  }
+  PLCHOST_TRY(in_step("folder for retain variables", check_own_folder(directory_)));
   auto held = LockFile::take(stem_ + ".lock");
   // Of an instance with a user of its own. In the folder of this user only he and root can remove it; that no
   // other process has this name is the matter of its claim.
@@ -68,8 +66,7 @@ Result<void> RetainFiles::take() {
   if (!held && held.error().code == ErrorCode::already_exists) {
     return failure(ErrorCode::busy, fmt::format("{}: retain files have one instance", held.error().message));
   }
-  if (!held) return std::unexpected(std::move(held).error());
-  lock_.emplace(*std::move(held));
+  PLCHOST_TRY_ASSIGN(lock_, std::move(held));
   return {};
 }
 

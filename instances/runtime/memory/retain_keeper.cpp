@@ -155,7 +155,7 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
                     : RetainMemory::prepare(pool, name, start.image);
   // The left-over may be a file without an object: then its values go on in a new one.
   if (!memory) memory = RetainMemory::prepare(pool, name, start.image);
-  if (!memory) return std::unexpected(std::move(memory).error());
+  PLCHOST_TRY(memory);
   return std::unique_ptr<RetainKeeper>(
       new RetainKeeper(pool, name, *std::move(memory), std::move(start), options));
 }
@@ -392,7 +392,7 @@ Result<void> save_left_behind(const LaunchOptions& launch) {
                  left.error().describe());
     return {};
   }
-  if (!left) return std::unexpected(left.error());
+  PLCHOST_TRY(left);
   PLCHOST_TRY_ASSIGN(const auto directory, directory_of(launch));
   if (directory.empty()) return failure(ErrorCode::not_found, "no folder for retain variables is given");
   PLCHOST_TRY_ASSIGN(auto files, RetainFiles::open(directory, launch.name));

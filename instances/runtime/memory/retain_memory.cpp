@@ -57,16 +57,15 @@ Result<RetainMemory::Left> RetainMemory::left_behind(const std::string& pool, co
   const auto damaged = [&](std::string_view what) {
     return failure(ErrorCode::corrupt, fmt::format("memory '{}': {}", name, what));
   };
-  const auto file =
-      MemoryFile::open(pool_memory_name(pool, name), sizeof(Header), MemoryFile::Access::read_only);
-  if (!file) return std::unexpected(file.error());
-  const Header& header = *reinterpret_cast<const Header*>(file->bytes().data());
+  PLCHOST_TRY_ASSIGN(const auto file, MemoryFile::open(pool_memory_name(pool, name), sizeof(Header),
+                                                       MemoryFile::Access::read_only));
+  const Header& header = *reinterpret_cast<const Header*>(file.bytes().data());
   Left left;
   RetainLayout& layout = left.image.layout;
   layout.bytes = header.bytes;
   const std::uint64_t areas = header.areas;
   if (header.magic != kRetainMagic || areas > kMaxRetainAreas || layout.bytes > kMaxRetainBytes ||
-      file->bytes().size() != bytes_for(layout.bytes)) {
+      file.bytes().size() != bytes_for(layout.bytes)) {
     return damaged("its header is overwritten, or of another version");
   }
   layout.application = header.application.view();
@@ -77,13 +76,13 @@ Result<RetainMemory::Left> RetainMemory::left_behind(const std::string& pool, co
   }
   if (auto valid = check_layout(layout); !valid) return damaged(valid.error().message);
   left.image.generation = header.generation.load(std::memory_order_relaxed);
-  const auto data = file->bytes().subspan(sizeof(Header), layout.bytes);
+  const auto data = file.bytes().subspan(sizeof(Header), layout.bytes);
   left.image.data.assign(data.begin(), data.end());
   left.in_cycle =
       static_cast<std::size_t>(std::ranges::count_if(header.counters, [](const CycleCounter& counter) {
         return counter.load(std::memory_order_relaxed) % 2 != 0;
       }));
-  if (!has_its_end(file->bytes()) || file->lost()) return damaged("it was cut short");
+  if (!has_its_end(file.bytes()) || file.lost()) return damaged("it was cut short");
   return left;
 }
 
@@ -98,16 +97,15 @@ std::unexpected<Error> not_guarded() {
 
 Result<RetainMemory> RetainMemory::take_over(ObjectPool& pool, const std::string& name,
                                              const RetainLayout& layout) {
-  auto opened = pool.open_memory(name);
-  if (!opened) return failure_in("retain variables", std::move(opened).error());
+  PLCHOST_TRY_ASSIGN(auto opened, in_step("retain variables", pool.open_memory(name)));
   const std::size_t bytes = bytes_for(layout.bytes);
-  if (opened->bytes().size() != bytes) {
+  if (opened.bytes().size() != bytes) {
     return failure(ErrorCode::wrong_size,
                    fmt::format("retain variables: their memory has {} bytes, {} are needed",
-                               opened->bytes().size(), bytes));
+                               opened.bytes().size(), bytes));
   }
-  if (!opened->guarded()) return not_guarded();
-  RetainMemory kept(*std::move(opened));
+  if (!opened.guarded()) return not_guarded();
+  RetainMemory kept(std::move(opened));
   for (CycleCounter& counter : kept.header().counters) counter.store(0, std::memory_order_relaxed);
   return kept;
 }
@@ -118,10 +116,10 @@ Result<RetainMemory> RetainMemory::prepare(ObjectPool& pool, const std::string& 
     return failure(ErrorCode::wrong_type, fmt::format("retain variables: '{}' is no shared memory but a {}",
                                                       name, to_string(known->type)));
   }
-  auto prepared = pool.prepare_memory(name, bytes_for(image.layout.bytes));
-  if (!prepared) return failure_in("retain variables", std::move(prepared).error());
-  if (!prepared->guarded()) return not_guarded();
-  const std::span bytes = prepared->bytes();
+  PLCHOST_TRY_ASSIGN(auto prepared,
+                     in_step("retain variables", pool.prepare_memory(name, bytes_for(image.layout.bytes))));
+  if (!prepared.guarded()) return not_guarded();
+  const std::span bytes = prepared.bytes();
   auto& header = *reinterpret_cast<Header*>(bytes.data());
   header.magic = kRetainMagic;
   header.generation.store(image.generation, std::memory_order_relaxed);
@@ -133,14 +131,12 @@ Result<RetainMemory> RetainMemory::prepare(ObjectPool& pool, const std::string& 
   }
   std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
   std::memcpy(bytes.last(sizeof(kRetainEnd)).data(), &kRetainEnd, sizeof(kRetainEnd));
-  return RetainMemory(*std::move(prepared));
+  return RetainMemory(std::move(prepared));
 }
 
 Result<void> RetainMemory::publish(ObjectPool& pool, const std::string& name) {
   if (!prepared_) return {};
-  auto published = pool.replace_memory(name, *prepared_);
-  if (!published) return failure_in("retain variables", std::move(published).error());
-  memory_ = *std::move(published);
+  PLCHOST_TRY_ASSIGN(memory_, in_step("retain variables", pool.replace_memory(name, *prepared_)));
   prepared_.reset();
   return {};
 }

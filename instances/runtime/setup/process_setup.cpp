@@ -104,8 +104,7 @@ Result<NameClaim> claim_name(const LaunchOptions& launch) {
   auto in_pool = LockFile::take(path);
   if (!in_pool && in_pool.error().code == ErrorCode::refused) {
     spdlog::warn("{}; it is removed and not used", in_pool.error().describe());
-    const auto gone = take_away(path);
-    in_pool = gone ? LockFile::take(path) : std::unexpected(gone.error());
+    in_pool = and_then(take_away(path), [&] { return LockFile::take(path); });
   }
   if (in_pool) {
     claim.in_pool.emplace(*std::move(in_pool));

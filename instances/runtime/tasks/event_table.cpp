@@ -17,9 +17,8 @@ Result<void> EventTable::clear_left_behind() {
   PLCHOST_TRY_ASSIGN(const auto objects, pool_->list());
   for (const ObjectInfo& object : objects) {
     if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
-    const auto event = pool_->open_event(object.name);
-    if (!event && event.error().code == ErrorCode::not_found) continue;
-    if (!event) return std::unexpected(event.error());
+    PLCHOST_TRY_ASSIGN(const auto event, if_found(pool_->open_event(object.name)));
+    if (!event) continue;
     (void)event->set_bound_tasks(0);
     (void)event->set_registered(false);
   }

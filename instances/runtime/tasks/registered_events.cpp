@@ -16,9 +16,7 @@ namespace plchost {
 
 Result<void> register_device_events(const DeviceDescription& device, EventTable& events) {
   for (const std::string& event : device.events) {
-    if (auto done = events.register_by_device(event); !done) {
-      return failure_in("event of the device description", std::move(done).error());
-    }
+    PLCHOST_TRY(in_step("event of the device description", events.register_by_device(event)));
   }
   return {};
 }

@@ -168,16 +168,15 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup,
   std::set<std::string> names;
   for (int i = 0; i < setup.nTasks; ++i) {
     Task_Info& task = setup.ptaskinfo[i];
-    const auto name = field_text(task.stName, "stName");
-    if (!name) return failure_in(fmt::format("task number {}", i), name.error());
-    if (auto valid = check_name("stName", *name, kMaxTaskName); !valid) {
-      return failure_in(fmt::format("task number {}", i), valid.error());
-    }
-    if (!names.insert(*name).second) return invalid_task(fmt::format("two tasks are called '{}'", *name));
-    auto config = build_task(task, codes.emplace_back(std::make_shared<TaskCode>()));
-    if (!config) return failure_in(fmt::format("task '{}'", *name), config.error());
-    config->name = *name;
-    configs.push_back(*std::move(config));
+    PLCHOST_TRY_ASSIGN(const auto name,
+                       in_step(fmt::format("task number {}", i), field_text(task.stName, "stName")));
+    PLCHOST_TRY(in_step(fmt::format("task number {}", i), check_name("stName", name, kMaxTaskName)));
+    if (!names.insert(name).second) return invalid_task(fmt::format("two tasks are called '{}'", name));
+    PLCHOST_TRY_ASSIGN(auto config,
+                       in_step(fmt::format("task '{}'", name),
+                               build_task(task, codes.emplace_back(std::make_shared<TaskCode>()))));
+    config.name = name;
+    configs.push_back(std::move(config));
   }
   return configs;
 }
@@ -209,7 +208,7 @@ Result<void> apply_task_settings(std::span<const TaskSettings> settings, std::ve
                                       from.task, names_of(tasks)));
     }
     write(from, *task);
-    if (auto valid = check_task(*task); !valid) return failure_in(from.where, std::move(valid).error());
+    PLCHOST_TRY(in_step(from.where, check_task(*task)));
   }
   return {};
 }

@@ -158,10 +158,11 @@ Result<Clocks> find_clocks(const SysTimeSettings& settings, std::span<const PF_S
                      [&](const std::string& symbol) { return find_in_loaded(find_in_components, symbol); });
   }
   // It stays loaded: an application may call it to the very end.
-  auto library = open_library(settings.library, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-  if (!library) return failure_in("[SysTime] CustomSysTimeLibrary", std::move(library).error());
+  PLCHOST_TRY_ASSIGN(auto library,
+                     in_step("[SysTime] CustomSysTimeLibrary",
+                             open_library(settings.library, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE)));
   return find_both(settings, own, [&](const std::string& symbol) {
-    return find_in_library(*library, settings.library, symbol);
+    return find_in_library(library, settings.library, symbol);
   });
 }
 
@@ -198,9 +199,7 @@ Result<void> use_system_time(const SysTimeSettings& settings, std::span<const PF
   if (settings == SysTimeSettings{}) return {};
   PLCHOST_TRY_ASSIGN(const auto clocks, find_clocks(settings, own, find_in_components));
   const auto& [us, ns] = clocks;
-  if (auto good = check_system_time({us.name, us.call}, {ns.name, ns.call}); !good) {
-    return failure_in("[SysTime]", std::move(good).error());
-  }
+  PLCHOST_TRY(in_step("[SysTime]", check_system_time({us.name, us.call}, {ns.name, ns.call})));
   custom_us = us.call;
   custom_ns = ns.call;
   return {};

@@ -72,8 +72,9 @@ Result<void> try_cores(const std::vector<int>& cores) {
   PLCHOST_TRY_ASSIGN(const auto before, allowed_cores(0));
   const auto granted = bind_to_cores(cores);
   const auto back = bind_to_cores(before);
-  if (!granted) return std::unexpected(granted.error());
-  return back ? Result<void>() : std::unexpected(back.error());
+  PLCHOST_TRY(granted);
+  PLCHOST_TRY(back);
+  return {};
 }
 
 // Nothing: there is no pool before the first start, and none for a process that may not look into it.

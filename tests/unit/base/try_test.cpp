@@ -99,6 +99,56 @@ TEST(Try, LeavesAVariablesErrorInIt) {
   EXPECT_EQ(changeable.error().message, "three are there");
 }
 
+TEST(Try, PutsTheStepBeforeTheError) {
+  const auto sut = run([]() -> Result<std::string> {
+    PLCHOST_TRY_ASSIGN(const auto number, in_step("counting", Result<int>(3)));
+    PLCHOST_TRY(in_step(std::to_string(number) + " of them", fail<void>()));
+    return "it went on";
+  });
+  ASSERT_FALSE(sut);
+  EXPECT_EQ(sut.error().code, ErrorCode::busy);
+  EXPECT_EQ(sut.error().message, "3 of them: three are there");
+  EXPECT_EQ(sut.error().system_errno, 11);
+}
+
+TEST(AndThen, IsTheResultOfTheNextCallOrTheFailure) {
+  int calls = 0;
+  const auto text_of = [&](int number) -> Result<std::string> {
+    ++calls;
+    return std::to_string(number);
+  };
+  EXPECT_EQ(and_then(Result<int>(3), text_of), "3");
+  expect_unchanged(and_then(fail<int>(), text_of));
+  expect_unchanged(and_then(fail<void>(), [&] { return text_of(4); }));
+  EXPECT_EQ(and_then(Result<void>(), [&] { return text_of(5); }), "5");
+  EXPECT_EQ(calls, 2);
+  const Result<std::unique_ptr<int>> kept(std::make_unique<int>(6));
+  EXPECT_EQ(and_then(kept, [&](const auto& of) { return text_of(*of); }), "6") << "not copied";
+}
+
+TEST(Try, GoesOnWithoutWhatNeedNotBeThere) {
+  const auto missing = [] { return failure(ErrorCode::not_found, "no such file"); };
+  const auto sut = run([&]() -> Result<std::string> {
+    PLCHOST_TRY_ASSIGN(const auto none, if_found(Result<int>(missing())));
+    PLCHOST_TRY_ASSIGN(const auto number, if_found(Result<int>(3)));
+    PLCHOST_TRY_ASSIGN(const bool gone, if_found(Result<void>(missing())));
+    PLCHOST_TRY_ASSIGN(const bool there, if_found(Result<void>()));
+    EXPECT_FALSE(none);
+    EXPECT_FALSE(gone);
+    EXPECT_TRUE(there);
+    return std::to_string(number.value());
+  });
+  EXPECT_EQ(sut, "3");
+  expect_unchanged(run([]() -> Result<std::string> {
+    PLCHOST_TRY_ASSIGN(const auto none, if_found(fail<int>()));
+    return none ? "it was there" : "it was not there";
+  }));
+  expect_unchanged(run([]() -> Result<std::string> {
+    PLCHOST_TRY(if_found(fail<void>()));
+    return "it went on";
+  }));
+}
+
 // Without braces it is one statement: the `else` is that of the `if` in the text.
 TEST(Try, IsOneStatement) {
   const auto sut = [](bool first) -> Result<std::string> {
