@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "api/cli/rows/table.hpp"
 #include "api/cli/words/command.hpp"
 #include "api/client/check_names.hpp"
+#include "api/client/client_types.hpp"
 #include "api/client/control_client.hpp"
 
 namespace plchost {
@@ -25,7 +27,7 @@ inline constexpr int kExitWarnings = 4;  ///< `check` has found warnings, and no
 struct CliOptions {
   dds::DomainOptions dds;
   HostSelection hosts;
-  double timeout_s = 3.0;
+  double timeout_s = std::chrono::duration<double>(kDefaultTimeout).count();
   bool timeout_given = false;
   bool json = false;
   bool csv = false;

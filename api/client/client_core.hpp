@@ -92,7 +92,7 @@ class ClientCore {
   // These wait for nothing.
 
   [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
-                                      std::string_view event);
+                                      std::string_view event, Duration patience);
   [[nodiscard]] Result<std::vector<TransitionView>> transitions();
   [[nodiscard]] bool is_silent(std::string_view host);
   [[nodiscard]] std::uint64_t changes();
@@ -199,6 +199,7 @@ class ClientCore {
   std::uint64_t host_changes_ = 0;
   TransitionLog transition_log_;
   TimePoint last_news_;
+  TimePoint hosts_look_;      ///< when update_hosts() was called last
   TimePoint told_keys_look_;  ///< when plc_forget_told_keys() was called last
   Duration quiet_ = kQuiet;
   dds::TopicReader replies_;

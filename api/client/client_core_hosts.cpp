@@ -54,6 +54,7 @@ std::vector<std::string> HostView::schedulers() const {
 
 void ClientCore::update_hosts() {
   const TimePoint now = MonotonicClock::now();
+  hosts_look_ = now;
   // None is kept beside what seen_ has of it: that is bounded.
   dds::take_valid_told<plc_Presence>(
       presence_.reader(), presence_.writers(), [&](const plc_Presence& presence, const auto& info) {

@@ -144,16 +144,22 @@ Async<Result<PostReport>> ClientCore::post_batch(std::string host, std::vector<E
   co_return failure(ErrorCode::timed_out, fmt::format("host '{}' has not acknowledged the batch", host));
 }
 
-Result<void> ClientCore::post_one(const std::string& host, std::string_view instance,
-                                  std::string_view event) {
-  if (auto good = check_event_name(instance, event); !good) return good;
+Result<void> ClientCore::post_one(const std::string& host, std::string_view instance, std::string_view event,
+                                  Duration patience) {
+  PLCHOST_TRY(check_event_name(instance, event));
   auto& posters = std::get<Posters<plc_EventPost>>(posters_).of_host;
   const auto way = posters.find(host);
   if (way == posters.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
-  auto posted = way->second.post_once(instance, event);
+  // Before the post only where the clock is old: this is latency of the post.
+  constexpr Duration kOld = 4 * dds::kPresencePeriod;
+  const TimePoint now = MonotonicClock::now();
+  if (now - hosts_look_ > kOld) update_hosts();
+  const HostClock* const clock = clock_of(host);
+  if (clock == nullptr) return failure(ErrorCode::unavailable, fmt::format("host '{}' is forgotten", host));
+  auto posted = way->second.post_once(instance, event, clock->limit_at(now + patience));
   // Nobody else reads meanwhile that the host has a new server, so that the one before needs no room any
   // more.
-  if (!posted) update_hosts();
+  if (!posted || now - hosts_look_ > dds::kPresencePeriod) update_hosts();
   return posted;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -19,6 +20,9 @@
 #include "shm/base/time.hpp"
 
 namespace plchost {
+
+/// How long a command or a post may take unless its caller says otherwise.
+inline constexpr Duration kDefaultTimeout = std::chrono::seconds(3);
 
 /// A request to one instance.
 struct ApiRequest {

@@ -138,8 +138,8 @@ Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<
 }
 
 Result<void> ControlClient::post_one(const std::string& host, std::string_view instance,
-                                     std::string_view event) {
-  return core_->post_one(host, instance, event);
+                                     std::string_view event, Duration patience) {
+  return core_->post_one(host, instance, event, patience);
 }
 
 std::uint64_t ControlClient::changes() {

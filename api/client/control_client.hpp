@@ -171,9 +171,10 @@ class ControlClient {
                                               Duration patience);
 
   /// One post with the least latency: one dds_write, not repeated, not waited for. prepare_posts() first. It
-  /// needs no credit of the host, as nothing is kept to be repeated. timed_out: DDS had no room within 20 ms.
+  /// needs no credit of the host, as nothing is kept to be repeated. The host rejects it after `patience`.
+  /// timed_out: DDS had no room within 20 ms. unavailable: 1024 other hosts were seen since this one was.
   [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
-                                      std::string_view event);
+                                      std::string_view event, Duration patience = kDefaultTimeout);
 
   /// Sleeps until something has come, wake() was called, or the deadline is there.
   void wait_for_change(TimePoint deadline) { core_->pump().round(deadline); }

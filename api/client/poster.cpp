@@ -92,14 +92,17 @@ void Poster<Sample>::ask_again(std::uint64_t number, const EventId& event) {
 }
 
 template <class Sample>
-Result<void> Poster<Sample>::post_once(std::string_view instance, std::string_view event) noexcept
+Result<void> Poster<Sample>::post_once(std::string_view instance, std::string_view event,
+                                       const plc_TimeLimit& limit) noexcept
   requires std::same_as<Sample, plc_EventPost>
 {
   dds::copy_text(sample_.instance, instance);
   dds::copy_text(sample_.event, event);
+  sample_.limit = limit;
   sample_.late_ack = true;
   const dds_return_t written = write(++last_sequence_);
   sample_.late_ack = false;
+  sample_.limit = {};
   return dds::check_code(written, "cannot post an event");
 }
 

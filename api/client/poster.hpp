@@ -80,8 +80,9 @@ class Poster {
   [[nodiscard]] std::size_t unacknowledged() const noexcept { return unacknowledged_.size(); }
 
   /// One post that is not repeated, and whose acknowledgement is not awaited: as fast as DDS is. One call
-  /// of dds_write.
-  [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event) noexcept
+  /// of dds_write. The host rejects it after `limit`.
+  [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event,
+                                       const plc_TimeLimit& limit) noexcept
     requires std::same_as<Sample, plc_EventPost>;
 
   /// Returns true if that acknowledged something.

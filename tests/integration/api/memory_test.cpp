@@ -61,7 +61,7 @@ TEST_F(Memory, WritersOfOneClientThatPostOnceLeaveNothingBehind) {
       ASSERT_LT(MonotonicClock::now(), end);
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
-    ASSERT_TRUE(poster.post_once("line1", "ready"));
+    ASSERT_TRUE(poster.post_once("line1", "ready", {}));
   });
 }
 

@@ -211,7 +211,7 @@ TEST(RemotePost, ThatNobodyWaitsForIsAcknowledgedNevertheless) {
   auto sut = EventPoster::create(participant.get(), events.get(), "hosta").value();
   while (!sut.matched()) std::this_thread::sleep_for(milliseconds(1));
 
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(sut.post_once("line1", "redy"));
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(sut.post_once("line1", "redy", {}));
 
   plc_EventAck told{};
   for (const TimePoint end = soon(); told.rejected < 100 && MonotonicClock::now() < end;) {

@@ -142,6 +142,40 @@ TEST_F(StoppedServer, RejectsAGivenUpPostAndNotTheNextOne) {
   EXPECT_EQ(event_.counted().count(), 3U);
 }
 
+TEST_F(StoppedServer, RejectsAPostThatNobodyAwaitsAfterItsTimeAndCountsIt) {
+  const auto client = known_client();
+  ASSERT_TRUE(client->post_one("hosta", "line1", "ready"));
+  while (event_.counted().count() < 1) std::this_thread::sleep_for(milliseconds(1));
+  stop_server();
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(client->post_one("hosta", "line1", "ready", milliseconds(100)));
+  std::this_thread::sleep_for(milliseconds(200));
+  go_on();
+
+  std::uint64_t later = 0;
+  while (event_.counted().count() < 2) {  // again: a host that stood still for long is met anew
+    ASSERT_TRUE(client->post_one("hosta", "line1", "ready", kPatience));
+    ++later;
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  plc_WriterStatus all{};
+  for (const TimePoint end = soon(); all.delivered < 2 && MonotonicClock::now() < end;) {
+    all = client->writers("hosta", end).value().front();
+    if (all.delivered < 2) client->wait_for_change(end);
+  }
+  EXPECT_GE(all.rejected + all.lost, 3U);
+  EXPECT_LE(event_.counted().count(), 1 + later);
+}
+
+TEST_F(StoppedServer, RejectsAPostThatNobodyAwaitsAfterTheTimeOfACommand) {
+  const auto client = known_client();
+  stop_server();
+  ASSERT_TRUE(client->post_one("hosta", "line1", "ready"));
+  std::this_thread::sleep_for(
+      std::chrono::nanoseconds((kDefaultTimeout + Duration(milliseconds(100))).count()));
+  go_on();
+  EXPECT_EQ(event_.counted().count(), 0U);
+}
+
 TEST_F(StoppedServer, LoadsNothingThatItsClientHasGivenUp) {
   const auto client = known_client();
   const std::vector<std::byte> contents(3'000'000, std::byte{7});
