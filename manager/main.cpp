@@ -82,8 +82,7 @@ int check_only(const std::string& file, const std::string& programs) {
       fmt::print("{}: [dds] identity: {}\n", file, good.error().describe());
       return kExitFailed;
     }
-    const std::size_t count = config->instances.size();
-    fmt::print("{}: ok, {} instance{}\n", file, count, count == 1 ? "" : "s");
+    fmt::print("{}: ok, {}\n", file, plchost::count_text(config->instances.size(), "instance"));
     return kExitDone;
   }
   for (const std::string& error : config.error()) fmt::print("{}\n", error);

@@ -23,6 +23,7 @@
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/service_manager.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
@@ -274,8 +275,9 @@ void Manager::changed(std::size_t place, const InstanceStatus& status) {
 }
 
 Result<void> Manager::run() {
-  spdlog::info("host '{}': {} instances, pool '{}', run directory {}", config_.host.name,
-               config_.instances.size(), config_.host.pool, config_.host.run_directory);
+  spdlog::info("host '{}': {}, pool '{}', run directory {}", config_.host.name,
+               count_text(config_.instances.size(), "instance"), config_.host.pool,
+               config_.host.run_directory);
   adopt_removed();
   warn_of_strangers(config_.host.run_directory, supervisor_->configs());
   supervisor_->start();
@@ -306,9 +308,10 @@ void Manager::look_after_pool() {
   const PoolFindings found = pool_->tidy();
   if (!found.lost && found.headers_mended + found.rebuilds + found.lost_objects != 0) {
     spdlog::warn(
-        "pool '{}': another program has written over it: header written anew {} times, damaged lists made "
-        "anew {} times, {} objects lost",
-        config_.host.pool, found.headers_mended, found.rebuilds, found.lost_objects);
+        "pool '{}': another program has written over it: header written anew {}, damaged lists made "
+        "anew {}, {} lost",
+        config_.host.pool, count_text(found.headers_mended, "time"), count_text(found.rebuilds, "time"),
+        count_text(found.lost_objects, "object"));
   }
   if (!found.lost || pool_lost_) return;
   pool_lost_ = true;

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "api/audit/audit_file.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/replace_file.hpp"
@@ -161,7 +162,7 @@ Result<void> AuditLog::append(const AuditRecord& record) {
   const auto all = [&]() -> Result<void> {
     if (bytes_ >= options_.file_bytes) PLCHOST_TRY(next_file());
     if (missed_ > 0) {
-      PLCHOST_TRY(write(of_the_log("gap", fmt::format("{} records could not be written", missed_))));
+      PLCHOST_TRY(write(of_the_log("gap", count_text(missed_, "record") + " could not be written")));
       missed_ = 0;
     }
     return write(record);

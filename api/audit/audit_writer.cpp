@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -100,7 +101,10 @@ bool AuditWriter::wait_to_open_again(const Error& error) {
   }
   const auto is_record = [](const Job& job) { return job.kind == Kind::done || job.kind == Kind::refused; };
   const auto lost = dropped_ + static_cast<std::uint64_t>(std::ranges::count_if(jobs_, is_record));
-  if (lost > 0) spdlog::error("{} records of changes are lost: {}", lost, failure_);
+  if (lost > 0) {
+    spdlog::error("{} lost: {}", count_text(lost, "record of a change is", "records of changes are"),
+                  failure_);
+  }
   return false;
 }
 

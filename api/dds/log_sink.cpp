@@ -50,7 +50,7 @@ void write_line(void* /*context*/, const dds_log_data_t* line) {
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   const bool severe = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
   spdlog::log(severe ? spdlog::level::err : spdlog::level::warn, "DDS: {}", printable(std::string(text)));
-  if (dropped > 0) spdlog::warn("DDS: {} more lines were not shown", dropped);
+  if (dropped > 0) spdlog::warn("DDS: {} not shown", count_text(dropped, "more line was", "more lines were"));
 }
 
 }  // namespace

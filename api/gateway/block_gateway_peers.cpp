@@ -132,8 +132,8 @@ void BlockGateway::remove_peer(Peers::iterator peer) {
 // Its blocks were sent and never taken, as after a cut that only one side has noticed: a fresh writer begins
 // a fresh sequence.
 void BlockGateway::renew_writer(Peer& peer) {
-  spdlog::warn("blocks: host '{}' is heard, but {} blocks for it are lost", peer.claim.host,
-               peer.window.under_way());
+  spdlog::warn("blocks: host '{}' is heard, but {} lost", peer.claim.host,
+               count_text(peer.window.under_way(), "block for it is", "blocks for it are"));
   count(&NodeCounters::lost, peer.window.under_way());
   peer.window = BlockWindow();
   peer.reached = false;  // until the new one has met its reader

@@ -9,6 +9,7 @@
 #include "api/client/status_count.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -95,8 +96,8 @@ Client::Outcome to_public(const PostReport& report) {
       .code = 0, .text = {}, .posted = {.accepted = report.accepted, .no_task = report.no_task}};
   if (report.unacknowledged > 0) {
     outcome.code = ClientError::timed_out;
-    outcome.text = fmt::format("the host has stopped answering: the fate of {} posts is not known",
-                               report.unacknowledged);
+    outcome.text = fmt::format("the host has stopped answering: the fate of {} is not known",
+                               count_text(report.unacknowledged, "post"));
   } else if (report.rejected > 0) {
     outcome.code = static_cast<int>(report.rejected_code);
     outcome.text =

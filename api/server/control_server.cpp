@@ -23,6 +23,7 @@
 #include "api/dds/told_keys.h"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 #include "shm/guard/memory_guard.hpp"
@@ -186,12 +187,12 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
 void ControlServer::Parts::tell_of_refused(TimePoint now) {
   const std::uint64_t datagrams = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
   if (const auto more = refused_datagrams.take(datagrams, now)) {
-    spdlog::warn(
-        "{} datagrams were rejected before DDS read them, whole or in part: they are no RTPS, or malformed",
-        more);
+    spdlog::warn("{} rejected before DDS could read all of it: no RTPS, or malformed",
+                 count_text(more, "datagram was", "datagrams were"));
   }
   if (const auto more = malformed_posts.take(intake->malformed(), now)) {
-    spdlog::warn("{} posts rejected: source differs from the writer, or invalid sequence number", more);
+    spdlog::warn("{} rejected: source differs from the writer, or invalid sequence number",
+                 count_text(more, "post"));
   }
 }
 
@@ -217,7 +218,7 @@ bool ControlServer::Parts::identity_changed() {
     return false;
   }
   for (const std::string& problem : known->problems()) spdlog::warn("identity: {}", problem);
-  spdlog::info("{} identities are known", known->size());
+  spdlog::info("{} known", count_text(known->size(), "identity is", "identities are"));
   guard.replace(std::move(*known));
   return false;
 }

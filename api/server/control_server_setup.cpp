@@ -16,6 +16,7 @@
 #include "api/dds/secured_announcement.h"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/log/log.hpp"
 
@@ -130,18 +131,17 @@ Result<void> ControlServer::Parts::make_guard() {
   }
   // Before what is watched is read: no change is missed.
   identity_watch.emplace(folder);
-  const auto own = security::check_identity(folder);
-  if (!own) return failure_in("identity", own.error());
-  if (auto good = security::check_host_identity(own->subject, options.host); !good)
-    return failure_in("identity", good.error());
-  auto known = security::KnownIdentities::load(folder);
-  if (!known) return failure_in("identity", known.error());
-  for (const std::string& problem : known->problems()) spdlog::warn("identity: {}", problem);
-  spdlog::info("secured: identity '{}', {} identities are known", own->subject.name, known->size());
-  const std::time_t left = own->validity.not_after - std::time(nullptr);
+  PLCHOST_TRY_ASSIGN(const auto own, in_step("identity", security::check_identity(folder)));
+  PLCHOST_TRY(in_step("identity", security::check_host_identity(own.subject, options.host)));
+  PLCHOST_TRY_ASSIGN(auto known, in_step("identity", security::KnownIdentities::load(folder)));
+  for (const std::string& problem : known.problems()) spdlog::warn("identity: {}", problem);
+  spdlog::info("secured: identity '{}', {} known", own.subject.name,
+               count_text(known.size(), "identity is", "identities are"));
+  const std::time_t left = own.validity.not_after - std::time(nullptr);
   if (left < security::kExpiresSoon) {
-    spdlog::warn("identity '{}' expires in {} days: 'plcctl security renew {}'", own->subject.name,
-                 left / std::time_t{86'400}, own->subject.name);
+    spdlog::warn("identity '{}' expires in {}: 'plcctl security renew {}'", own.subject.name,
+                 count_text(static_cast<std::uint64_t>(std::max<std::time_t>(left / 86'400, 0)), "day"),
+                 own.subject.name);
   }
   guard.replace(std::move(known));
   return {};

@@ -4,6 +4,7 @@
 
 #include "manager/host_check/checks.hpp"
 #include "shm/base/cpu_list.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost::host_check {
 
@@ -54,7 +55,8 @@ HostFinding interrupts(const CheckedHost& host) {
   }
   if (hits.empty() && unreadable) return unknown(kSubject, *unreadable, kWhy);
   if (hits.empty()) return finding(FindingLevel::ok, kSubject, "none comes to an instance's core", kWhy);
-  const std::string found = fmt::format("{} interrupts: {}", hits.size(), join_some(hits, "; ", kShown));
+  const std::string found =
+      fmt::format("{}: {}", count_text(hits.size(), "interrupt"), join_some(hits, "; ", kShown));
   return finding(FindingLevel::warning, name_cores(host, each_once(std::move(hit_cores))), found, kWhy,
                  "boot with irqaffinity= and isolcpus=managed_irq, or write the housekeeping cores to "
                  "/proc/irq/N/smp_affinity_list; keep irqbalance away (IRQBALANCE_BANNED_CPULIST)");

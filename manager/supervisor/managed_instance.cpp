@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
 #include "shm/base/transient.hpp"
 #include "shm/files/memory_rights.hpp"
@@ -130,8 +131,8 @@ std::string ManagedInstance::problem_when_up() {
   if (removed_) problem = "removed from the configuration: it runs until it is stopped";
   const auto add = [&](const std::string& text) { problem += (problem.empty() ? "" : "; ") + text; };
   if (history_.safe_mode) {
-    add(fmt::format("safe mode after {} crashes within {} s, the last: {}; load an application, or reset it",
-                    config_.crash_limit,
+    add(fmt::format("safe mode after {} within {} s, the last: {}; load an application, or reset it",
+                    count_text(config_.crash_limit, "crash", "crashes"),
                     std::chrono::ceil<std::chrono::seconds>(config_.crash_window).count(),
                     last_end_.empty() ? "unknown" : last_end_));
   } else if (application_.empty()) {

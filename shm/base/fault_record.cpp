@@ -9,6 +9,8 @@
 #include <cxxabi.h>
 #include <fmt/format.h>
 
+#include "shm/base/names.hpp"
+
 namespace plchost {
 
 namespace {
@@ -117,11 +119,14 @@ std::string describe_fault(const FaultRecord& record) {
       return fmt::format("still running{} after {:.3f} ms; the limit is {:.3f} ms{}", where,
                          ms(record.figure), ms(record.limit), runs_on);
     case FaultKind::consecutive_overruns:
-      return fmt::format("{} cycles in a row took longer than {:.3f} ms, the last {:.3f} ms", record.count,
+      return fmt::format("{} took longer than {:.3f} ms, the last {:.3f} ms",
+                         count_text(static_cast<std::uint64_t>(record.count), "cycle", "cycles in a row"),
                          ms(record.limit), ms(record.figure));
     case FaultKind::omitted_cycles:
-      return fmt::format("{} releases in a row passed without a cycle; the limit is {}{}", record.figure,
-                         record.limit, runs_on);
+      return fmt::format(
+          "{} passed without a cycle; the limit is {}{}",
+          count_text(static_cast<std::uint64_t>(record.figure), "release", "releases in a row"), record.limit,
+          runs_on);
     case FaultKind::processor_load:
       return fmt::format("the instance used {} % of its core; the limit is {} %. This task used the most",
                          record.figure, record.limit);

@@ -118,6 +118,11 @@ std::string join_names(std::span<const std::string_view> names) {
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
+std::string count_text(std::uint64_t count, std::string_view one, std::string_view several) {
+  if (count == 1) return fmt::format("1 {}", one);
+  return several.empty() ? fmt::format("{} {}s", count, one) : fmt::format("{} {}", count, several);
+}
+
 std::string unknown_option(std::span<const std::string> words, std::span<const std::string> options) {
   const std::vector<std::string_view> known(options.begin(), options.end());
   for (const std::string& word : words) {

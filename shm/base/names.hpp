@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -55,6 +56,10 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 
 /// "a, b, c", for messages that list what is allowed; "none" if there is nothing.
 [[nodiscard]] std::string join_names(std::span<const std::string_view> names);
+
+/// "1 task", "3 tasks": a number and its noun. `several`: the plural, if it is not the noun with an s.
+[[nodiscard]] std::string count_text(std::uint64_t count, std::string_view one,
+                                     std::string_view several = {});
 
 /// The error text for the first word that looks like an option and is none of `options` ("--config", "-o"):
 /// "unknown option '--confg' (did you mean '--config'?); known are --config, -o". Empty: there is none.

@@ -34,8 +34,8 @@ class ErrorStreamSink final : public spdlog::sinks::base_sink<std::mutex> {
 
  private:
   void tell_of_lost(const spdlog::details::log_msg& next) {
-    const std::string text =
-        fmt::format("{} lines before this one were lost, because nobody read them", lost_);
+    const std::string text = count_text(lost_, "line before this one was", "lines before this one were") +
+                             " lost, because nobody read them";
     const spdlog::details::log_msg message(next.time, {}, next.logger_name, spdlog::level::warn, text);
     spdlog::memory_buf_t line;
     formatter_->format(message, line);

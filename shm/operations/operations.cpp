@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/names.hpp"
+
 namespace plchost {
 
 namespace {
@@ -67,8 +69,7 @@ std::string_view to_string(ControlVerb verb) noexcept {
 }
 
 std::string ended_forces_text(std::size_t count) {
-  if (count == 0) return "";
-  return count == 1 ? "1 force ended" : fmt::format("{} forces ended", count);
+  return count == 0 ? std::string() : count_text(count, "force") + " ended";
 }
 
 std::string done_text(const Operation& operation, std::string_view argument) {

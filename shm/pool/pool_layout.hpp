@@ -249,7 +249,7 @@ inline constexpr std::array<ObjectTraits, kObjectTypes> kObjectTraits{
       .value = [](const ObjectEntry& entry) noexcept { return std::uint64_t{entry.semaphore.value()}; }},
      {.type = ObjectType::event,
       .name = "event",
-      .value_form = "{} posts",
+      .value_form = "posts {}",
       .has_tasks = true,
       .least_initial = 0,
       .most_initial = 0,

@@ -155,9 +155,9 @@ Result<void> DebugConsole::tasks() {
   for (const Json& task : state_.value("tasks", Json::array())) {
     std::string text = fmt::format("task {}  {}", task.value("task", ""), task.value("state", ""));
     if (task.contains("halts")) {
-      text += fmt::format("  halts {}, {} ms, {} releases passed meanwhile",
-                          task.value("halts", std::uint64_t{0}), task.value("halted_ms", std::int64_t{0}),
-                          task.value("releases_halted", std::uint64_t{0}));
+      text += fmt::format("  halts {}, {} ms, {} passed meanwhile", task.value("halts", std::uint64_t{0}),
+                          task.value("halted_ms", std::int64_t{0}),
+                          count_text(task.value("releases_halted", std::uint64_t{0}), "release"));
     }
     const Json stack = task.value("stack", Json::array());
     if (!stack.empty()) text += "  at " + place_text(stack.front());

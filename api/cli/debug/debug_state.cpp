@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/names.hpp"
 #include "shm/variables/variable_symbol.hpp"
 
 namespace plchost {
@@ -65,7 +66,8 @@ std::vector<DebugNews::Line> DebugNews::lines(const Json& state) {
   const auto miss_until = [&](std::uint64_t number) {
     if (number <= logged_) return;
     fresh.push_back(
-        {.text = fmt::format("{} lines of log points came too fast and are missing here", number - logged_),
+        {.text = count_text(number - logged_, "line of a log point is", "lines of log points are") +
+                 " missing here: too many came at once",
          .is_gap = true});
     logged_ = number;
   };

@@ -19,7 +19,8 @@ Row to_row(std::string_view host, std::string_view instance, const LogText& line
 
 std::string format_log_line(const LogText& line) {
   const std::string missing =
-      line.missing > 0 ? fmt::format("({} lines are missing here)\n", line.missing) : std::string();
+      line.missing > 0 ? fmt::format("({} missing here)\n", count_text(line.missing, "line is", "lines are"))
+                       : std::string();
   return fmt::format("{}{}  {:<7}  {:<11}  {}\n", missing, time_text(line.last.time_unix_ns),
                      dds::log_level_name(line.last.level), dds::log_source_name(line.last.source),
                      printable(line.text));

@@ -8,6 +8,7 @@
 
 #include "api/cli/rows/rows.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -59,7 +60,8 @@ std::string state_text(const ListedObject& object) {
   std::string text =
       fmt::format(fmt::runtime(traits.value_form), traits.has_size ? record.size : record.value);
   if (traits.has_tasks) {
-    text += fmt::format(", {}registered, {} tasks", record.registered ? "" : "not ", record.bound_tasks);
+    text += fmt::format(", {}registered, {}", record.registered ? "" : "not ",
+                        count_text(record.bound_tasks, "task"));
   }
   return text;
 }

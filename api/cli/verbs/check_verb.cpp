@@ -39,8 +39,9 @@ void print_all(const std::vector<plc_HostFinding>& findings, bool all) {
     ++count.at(std::min<std::size_t>(finding.level, kProblem));
     if (all || finding.level != kOk) print(finding);
   }
-  fmt::print("{} problems, {} warnings, {} notes, {} ok{}\n", count[kProblem], count[kWarning], count[kNote],
-             count[kOk], all || count[kOk] == 0 ? "" : " (--all shows them)");
+  fmt::print("{}, {}, {}, {} ok{}\n", count_text(count[kProblem], "problem"),
+             count_text(count[kWarning], "warning"), count_text(count[kNote], "note"), count[kOk],
+             all || count[kOk] == 0 ? "" : " (--all shows them)");
 }
 
 int check_host(CliSession& session, bool all) {

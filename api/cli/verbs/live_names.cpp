@@ -12,6 +12,7 @@
 #include "api/cli/rows/status_rows.hpp"
 #include "api/client/status_count.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -25,8 +26,7 @@ using Names = std::vector<Candidate>;
 using Source = std::function<void(ControlClient&, const HostView&, TimePoint, Names&)>;
 
 void add_host(ControlClient& /*client*/, const HostView& host, TimePoint /*deadline*/, Names& names) {
-  names.push_back(
-      {host.name, fmt::format("{} instances", count_of<plc_InstanceStatus>(host.status).value_or(0))});
+  names.push_back({host.name, count_text(count_of<plc_InstanceStatus>(host.status).value_or(0), "instance")});
 }
 
 /// `name` and `text` make a candidate of a sample's row.
@@ -63,7 +63,7 @@ Source events() {
   return from(
       &ControlClient::events,
       [](const Row& row) { return field(row, "instance") + "/" + field(row, "event"); },
-      [](const Row& row) { return field(row, "posts") + " posts"; });
+      [](const Row& row) { return count_text(row.value("posts", std::uint64_t{0}), "post"); });
 }
 
 void add_objects(ControlClient& client, const HostView& host, TimePoint deadline, Names& names) {

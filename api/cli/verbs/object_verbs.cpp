@@ -138,9 +138,10 @@ ObjectLook look_of(const std::string& host, const ListedObject& object) {
   const plc_ObjectRecord& record = object.record;
   constexpr std::size_t kHoldersInLine = 8;
   const std::string by = holders_text(object, kHoldersInLine);
-  ObjectLook look{.row = to_row(host, object),
-                  .text = fmt::format("{}, {} waiters, {} references{}{}", state_text(object), record.waiters,
-                                      record.reference_count, by.empty() ? "" : ": ", by)};
+  ObjectLook look{
+      .row = to_row(host, object),
+      .text = fmt::format("{}, {}, {}{}{}", state_text(object), count_text(record.waiters, "waiter"),
+                          count_text(record.reference_count, "reference"), by.empty() ? "" : ": ", by)};
   look.row["present"] = true;
   return look;
 }

@@ -49,8 +49,8 @@ int tell(CliSession& session, const std::string& host, const PostArguments& argu
   }
   if (report.unacknowledged > 0) {
     return CliSession::fail({ErrorCode::timed_out, 0,
-                             fmt::format("host '{}' has stopped answering: the fate of {} posts is not known",
-                                         host, report.unacknowledged)});
+                             fmt::format("host '{}' has stopped answering: the fate of {} is not known", host,
+                                         count_text(report.unacknowledged, "post"))});
   }
   if (report.rejected == 0) return kExitDone;
   std::string text = fmt::format("{} rejected: {}", report.rejected, report.rejected_text);

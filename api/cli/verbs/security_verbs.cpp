@@ -10,6 +10,7 @@
 
 #include "api/security/identity.hpp"
 #include "api/security/security_folder.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -64,15 +65,16 @@ int add_identity(const Said& said) {
   if (!role) return CliSession::fail(role.error());
   return with_folder(said, [&](SecurityFolder& folder) {
     return finish(folder.add(*role, said.name, static_cast<int>(said.days)),
-                  fmt::format("{}/{}: identity '{}', {}, for {} days", said.directory, said.name, said.name,
-                              said.role, said.days));
+                  fmt::format("{}/{}: identity '{}', {}, for {}", said.directory, said.name, said.name,
+                              said.role, count_text(static_cast<std::uint64_t>(said.days), "day")));
   });
 }
 
 int renew(const Said& said) {
   return with_folder(said, [&](SecurityFolder& folder) {
     return finish(folder.renew(said.name, static_cast<int>(said.days)),
-                  fmt::format("{}/{}: renewed, for {} days", said.directory, said.name, said.days));
+                  fmt::format("{}/{}: renewed, for {}", said.directory, said.name,
+                              count_text(static_cast<std::uint64_t>(said.days), "day")));
   });
 }
 

@@ -13,6 +13,7 @@
 
 #include "api/cli/interrupt.hpp"
 #include "api/cli/rows/variable_rows.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/next_on_grid.hpp"
 
 namespace plchost {
@@ -106,7 +107,7 @@ int record(CliSession& session, const RecordArguments& arguments) {
                                           });
   if (!written) return CliSession::fail(written.error());
   if (file && recording && (code == kExitDone || code == kExitNoAnswer))
-    session.say(fmt::format("{} samples in {}", recording->samples(), arguments.file));
+    session.say(fmt::format("{} in {}", count_text(recording->samples(), "sample"), arguments.file));
   return code;
 }
 

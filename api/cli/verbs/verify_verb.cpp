@@ -32,9 +32,9 @@ int verify_audit(const CliSession& session, const std::string& folder) {
   for (const std::string& remark : findings->remarks) fmt::print("note     {}\n", printable(remark));
   if (findings->first > 1)
     fmt::print("note     the log begins at record {}: earlier files are gone\n", findings->first);
-  fmt::print("{}  {} records, {} to {}; the last one's hash is {}\n",
-             code == kExitDone ? "ok     " : "problem", findings->records, findings->first,
-             findings->head.number, findings->head.hash);
+  fmt::print("{}  {}, {} to {}; the last one's hash is {}\n", code == kExitDone ? "ok     " : "problem",
+             count_text(findings->records, "record"), findings->first, findings->head.number,
+             findings->head.hash);
   return code;
 }
 

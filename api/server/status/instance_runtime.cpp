@@ -7,6 +7,7 @@
 
 #include "api/dds/text.hpp"
 #include "api/server/status/host_grid.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -52,8 +53,7 @@ std::string problem_of_instance(const InstanceStatus& status, const InstanceRunt
   if (runtime == nullptr || runtime->pid != status.pid) return problem;
   add(problem, runtime->retain_problem.view());
   if (runtime->forces > 0)
-    add(problem, runtime->forces == 1 ? "1 variable is forced"
-                                      : fmt::format("{} variables are forced", runtime->forces));
+    add(problem, count_text(runtime->forces, "variable is", "variables are") + " forced");
   return problem;
 }
 

@@ -16,6 +16,7 @@
 
 #include "instances/io/modbus/config/load_modbus.hpp"
 #include "instances/io/modbus/modbus_process.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/guard/memory_guard.hpp"
@@ -71,8 +72,8 @@ Result<UniqueFd> hold_alone(const std::string& file) {
 int check_only(const std::string& file) {
   const auto config = load_modbus_config(file);
   if (config) {
-    fmt::print("{}: ok, {} devices, {} images{}\n", file, config->devices.size(), config->images.size(),
-               config->server ? ", a server" : "");
+    fmt::print("{}: ok, {}, {}{}\n", file, count_text(config->devices.size(), "device"),
+               count_text(config->images.size(), "image"), config->server ? ", a server" : "");
     return EXIT_SUCCESS;
   }
   for (const std::string& error : config.error()) fmt::print("{}\n", error);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost::modbus {
@@ -69,7 +70,7 @@ Result<void> ModbusProcess::start_threads() {
 Result<void> ModbusProcess::run(int signals) {
   show(MonotonicClock::now(), false);  // the first status of each device, before it is polled
   PLCHOST_TRY(start_threads());
-  spdlog::info("{} devices, {} images", devices_.size(), config_.images.size());
+  spdlog::info("{}, {}", count_text(devices_.size(), "device"), count_text(config_.images.size(), "image"));
   pollfd signal{.fd = signals, .events = POLLIN, .revents = 0};
   while (::poll(&signal, 1, static_cast<int>(kShow.count())) == 0 || errno == EINTR) {
     if (signal.revents != 0) break;

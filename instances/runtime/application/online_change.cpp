@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/application/compare_versions.hpp"
+#include "shm/base/names.hpp"
 #include "shm/operations/operations.hpp"
 
 namespace plchost {
@@ -126,10 +127,11 @@ void OnlineChange::finish(const std::function<void()>& notify) {
 std::string OnlineChange::describe() const {
   std::size_t bytes = 0;
   for (const Copy& copy : copies_) bytes += copy.bytes;
-  std::string text = fmt::format("{} areas go on, {}", host_.areas().declared().size(),
-                                 copied_.empty() ? std::string("no variables were carried over")
-                                                 : fmt::format("variables {} were carried over ({} bytes)",
-                                                               first_of(copied_, ", "), bytes));
+  std::string text = fmt::format(
+      "{} on, {}", count_text(host_.areas().declared().size(), "area goes", "areas go"),
+      copied_.empty()
+          ? std::string("no variables were carried over")
+          : fmt::format("variables {} were carried over ({} bytes)", first_of(copied_, ", "), bytes));
   if (!variables_.ended.empty())
     text += fmt::format("; {}, of variables that are not the same: {}",
                         ended_forces_text(variables_.ended.size()), first_of(variables_.ended, ", "));

@@ -208,8 +208,9 @@ std::size_t DebugService::halted() const noexcept {
 
 void DebugService::end_session(std::string_view why) {
   const std::size_t count = halted();
-  spdlog::warn("debug session {} ends: {}; {} breakpoints are gone, {} halted tasks go on", session_, why,
-               breakpoints_.size(), count);
+  spdlog::warn("debug session {} ends: {}; {} gone, {} on", session_, why,
+               count_text(breakpoints_.size(), "breakpoint is", "breakpoints are"),
+               count_text(count, "halted task goes", "halted tasks go"));
   publish({});
   session_ = 0;
   halt_all_ = false;
@@ -228,7 +229,7 @@ std::size_t DebugService::suspend(std::string_view why) {
     (void)task->forget_steps();
     task->rouse();
   }
-  if (count > 0) spdlog::warn("{} halted tasks go on: {}", count, why);
+  if (count > 0) spdlog::warn("{} on: {}", count_text(count, "halted task goes", "halted tasks go"), why);
   return count;
 }
 

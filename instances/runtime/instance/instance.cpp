@@ -376,7 +376,7 @@ void Instance::look_after_page() {
   spdlog::warn(
       "the page of this instance was written over by another program ({} so far) and is written anew; "
       "statistics of tasks may be wrong: reset them",
-      page_damages_);
+      count_text(page_damages_, "time"));
 }
 
 }  // namespace plchost

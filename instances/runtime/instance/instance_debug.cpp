@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/instance/instance.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -102,7 +103,8 @@ void Instance::begin_debugging() {
 
 std::string Instance::take_let_go() {
   const std::size_t count = std::exchange(let_go_, 0);
-  return count == 0 ? std::string() : fmt::format("{} halted tasks were let go first", count);
+  return count == 0 ? std::string()
+                    : count_text(count, "halted task was", "halted tasks were") + " let go first";
 }
 
 std::string Instance::with_let_go(const std::string& text) {

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/instance/instance.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -49,8 +50,9 @@ void Instance::start(TaskSet::Prepared prepared, std::string_view why) {
   tasks_->start(std::move(prepared));
   host_->events().publish_bound(true);
   unbound_.assign(application_->tasks().size(), false);
-  life_.go_to(ApplicationState::running, fmt::format("{}: {} tasks under {}", why,
-                                                     application_->tasks().size(), tasks_->scheduler_name()));
+  life_.go_to(ApplicationState::running,
+              fmt::format("{}: {} under {}", why, count_text(application_->tasks().size(), "task"),
+                          tasks_->scheduler_name()));
 }
 
 Result<std::string> Instance::start_by_command() {

@@ -9,6 +9,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/settings/read_settings.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -75,8 +76,8 @@ struct RetainKeeper::Start {
     }
     if (left && left->image.generation >= generation) {
       if (left->in_cycle > 0) {
-        remarks.push_back(
-            fmt::format("the process before ended within the cycles of {} tasks", left->in_cycle));
+        remarks.push_back("the process before ended within the cycles of " +
+                          count_text(left->in_cycle, "task"));
       }
       generation = left->image.generation;
       origin = PLC_AREA_RETAINED;
@@ -403,7 +404,8 @@ Result<void> save_left_behind(const LaunchOptions& launch) {
     if (newer || (found.newest->layout == image.layout && found.newest->data == image.data)) return {};
   }
   if (left->in_cycle > 0) {
-    spdlog::warn("retain variables: the process ended within the cycles of {} tasks", left->in_cycle);
+    spdlog::warn("retain variables: the process ended within the cycles of {}",
+                 count_text(left->in_cycle, "task"));
   }
   ++image.generation;
   image.unix_ns = unix_time_ns();

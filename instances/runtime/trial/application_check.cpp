@@ -165,8 +165,8 @@ int check_application(const Options& options) {
     return kExitSetupFailed;
   }
   const Application& application = declared->application;
-  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, printable(application.name()),
-             application.tasks().size());
+  fmt::print("{}{}{}, {}\n", path, kValidApplication, printable(application.name()),
+             count_text(application.tasks().size(), "task"));
   for (const TaskConfig& task : application.tasks()) {
     fmt::print("  {}: {}, priority {}{}\n", task.name, traits_of(task.kind).name, task.iec_priority,
                detail_of(task));

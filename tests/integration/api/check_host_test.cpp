@@ -47,7 +47,7 @@ TEST_F(CheckHost, PrintsTheWorstFirstWithWhatToChange) {
   EXPECT_LT(warning, note);
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("why:    slow at first\n"), HasSubstr("change: use performance\n"),
-                    HasSubstr("1 problems, 1 warnings, 1 notes, 1 ok (--all shows them)"),
+                    HasSubstr("1 problem, 1 warning, 1 note, 1 ok (--all shows them)"),
                     Not(HasSubstr("clock_source")), Not(HasSubstr("\x1b"))));
   EXPECT_THAT(run({"--all"}).output, HasSubstr("ok       clock_source"));
 }

@@ -163,7 +163,7 @@ TEST_F(OneHost, IsNamedToPlcctl) {
   until_it_is_so([&] { return offered({"--host", "hosta", "show", "instance", ""}) == "line1\trunning\n"; });
   until_it_is_so([&] {
     return offered({"--host", "hosta", "stop", "instance", "line1", "--host", "host"}) ==
-           "hosta\t1 instances\nhostb\t1 instances\n";
+           "hosta\t1 instance\nhostb\t1 instance\n";
   });
 }
 

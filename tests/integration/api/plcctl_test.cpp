@@ -191,7 +191,7 @@ TEST_F(Plcctl, CompletesTheNamesThatThereAre) {
   EXPECT_EQ(offered({"post", "event", "l"}), "line1/ready\t0 posts\n");
   EXPECT_EQ(offered({"post", "event", "x"}), "");
   EXPECT_EQ(offered({"show", "task", ""}), "line1/Main\tcyclic, created\n");
-  EXPECT_EQ(offered({"--host", ""}), "hosta\t1 instances\n");
+  EXPECT_EQ(offered({"--host", ""}), "hosta\t1 instance\n");
   EXPECT_THAT(offered({"show", "object", ""}), HasSubstr("line1/ready\t"));
   EXPECT_EQ(offered({"load", "application", "line1", ""}), ":files\n");
 }

@@ -225,7 +225,7 @@ TEST_F(DebuggingByHand, LetsTasksGoWhenTheDebuggerLeaves) {
   EXPECT_TRUE(goes_on("Main"));
   EXPECT_TRUE(state()["breakpoints"].empty());
   EXPECT_THAT(refused("pause Main"), HasSubstr("is over"));
-  EXPECT_THAT(process_->log(), HasSubstr("1 halted tasks go on"));
+  EXPECT_THAT(process_->log(), HasSubstr("1 halted task goes on"));
 }
 
 TEST_F(DebuggingByHand, LetsTasksGoWhenTheDebuggerIsSilent) {
@@ -280,7 +280,7 @@ TEST_F(DebuggingByHand, StopsAndStartsAHaltedTask) {
   ASSERT_TRUE(halts("Main"));
   const ControlReply stopped = process_->ask(ControlVerb::stop);
   EXPECT_EQ(stopped.code, ErrorCode::ok) << stopped.text;
-  EXPECT_THAT(stopped.text, HasSubstr("1 halted tasks were let go first"));
+  EXPECT_THAT(stopped.text, HasSubstr("1 halted task was let go first"));
   for (const char* const name : {"Main", "Other", "Edge"})
     EXPECT_EQ(task(name).value("state", ""), "stopped") << "with the reply";
   EXPECT_EQ(process_->ask(ControlVerb::start).code, ErrorCode::ok);
@@ -296,7 +296,7 @@ TEST_F(DebuggingByHand, IgnoresTasksOfExternalEventsUnderOtherSchedulers) {
   edge.post();
   ASSERT_TRUE(halts("Edge"));
   const ControlReply switched = process_->ask(ControlVerb::set_scheduler, "CmpScheduleTimer");
-  EXPECT_THAT(switched.text, HasSubstr("1 halted tasks were let go first"));
+  EXPECT_THAT(switched.text, HasSubstr("1 halted task was let go first"));
   EXPECT_EQ(task("Edge").value("state", ""), "ignored");
   EXPECT_THAT(command("break Edge:42").value("remark", ""), HasSubstr("Edge"));
   const auto before = cycles("Edge");
@@ -310,7 +310,7 @@ TEST_F(DebuggingByHand, TakesAnotherVersionWhileATaskHalts) {
   ASSERT_TRUE(halts("Main"));
   const ControlReply changed = process_->ask(ControlVerb::change_application, application("steps"));
   EXPECT_EQ(changed.code, ErrorCode::ok) << changed.text;
-  EXPECT_THAT(changed.text, HasSubstr("1 halted tasks were let go first"));
+  EXPECT_THAT(changed.text, HasSubstr("1 halted task was let go first"));
   EXPECT_TRUE(halts("Main"));  // at the breakpoint in the new version
   EXPECT_EQ(stack("Main"), "Counter:14 Main:23");
 }

@@ -35,7 +35,7 @@ stop() {
   wait "${managers[0]}" || fail "the manager ended with $?"
   managers=()
 }
-looked_at() { grep -qE "datagrams were rejected|malformed packet" "$cell/cell1.log"; }
+looked_at() { grep -qE "datagrams? (was|were) rejected|malformed packet" "$cell/cell1.log"; }
 
 write_host cell1 "$first_core"
 start

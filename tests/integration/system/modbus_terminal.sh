@@ -58,8 +58,8 @@ address = 0
 count = 3
 image = "$host.out"
 END
-"$BIN/plchost-modbus" --check-config "$cell/modbus.toml" | grep -q 'ok, 1 devices, 2 images' || fail "the file is refused"
-"$BIN/plchost-modbus" --check-config "$(dirname "$0")/../../../instances/examples/packing/modbus.toml" | grep -q 'ok, 1 devices, 2 images' ||
+"$BIN/plchost-modbus" --check-config "$cell/modbus.toml" | grep -q 'ok, 1 device, 2 images' || fail "the file is refused"
+"$BIN/plchost-modbus" --check-config "$(dirname "$0")/../../../instances/examples/packing/modbus.toml" | grep -q 'ok, 1 device, 2 images' ||
   fail "the file of the packing line is refused"
 start_modbus() {
   "$BIN/plchost-modbus" --config "$cell/modbus.toml" 2>>"$cell/modbus.log" &

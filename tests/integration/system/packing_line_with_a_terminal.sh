@@ -4,7 +4,7 @@
 example=$(cd "$(dirname "$0")/../../../instances/examples/packing" && pwd)
 host=line
 
-"$BIN/plchost-modbus" --check-config "$example/modbus.toml" | grep -q 'ok, 1 devices, 2 images' || fail "the file is refused"
+"$BIN/plchost-modbus" --check-config "$example/modbus.toml" | grep -q 'ok, 1 device, 2 images' || fail "the file is refused"
 [ -n "${PLCHOST_MATIEC:-}${PLCHOST_STRUCPP:-}" ] || { echo "left out: it needs a compiler (PLCHOST_MATIEC, PLCHOST_STRUCPP)"; exit 77; }
 "$BIN/plcctl" build application "$example/packing.st" -o "$cell/packing.so" 2>"$cell/build.log" || fail "not built"
 

@@ -33,9 +33,9 @@ TEST(DebugNews, TellsEachLineOnce) {
 TEST(DebugNews, TellsLinesThatAreMissingAtTheBeginInTheMiddleAndAtTheEnd) {
   DebugNews sut;
   EXPECT_THAT(texts(sut, {{"log", {line(4), line(7)}}, {"logged", 9}}),
-              ElementsAre("3 lines of log points came too fast and are missing here", "line 4",
-                          "2 lines of log points came too fast and are missing here", "line 7",
-                          "2 lines of log points came too fast and are missing here"));
+              ElementsAre("3 lines of log points are missing here: too many came at once", "line 4",
+                          "2 lines of log points are missing here: too many came at once", "line 7",
+                          "2 lines of log points are missing here: too many came at once"));
   EXPECT_THAT(texts(sut, {{"log", {line(7)}}, {"logged", 9}}), IsEmpty());
 }
 

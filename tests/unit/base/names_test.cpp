@@ -106,6 +106,14 @@ TEST(FixedText, NeverReadsPastItsEnd) {
   EXPECT_EQ(sut.view(), "xxxx");
 }
 
+TEST(CountText, HasTheNounOfItsNumber) {
+  EXPECT_EQ(count_text(0, "task"), "0 tasks");
+  EXPECT_EQ(count_text(1, "task"), "1 task");
+  EXPECT_EQ(count_text(2, "task"), "2 tasks");
+  EXPECT_EQ(count_text(1, "identity is", "identities are"), "1 identity is");
+  EXPECT_EQ(count_text(3, "identity is", "identities are"), "3 identities are");
+}
+
 TEST(UnknownOption, IsNamedWithTheOneThatIsMeantAndAllThatThereAre) {
   const std::vector<std::string> options = {"-o", "--output", "--config"};
   const auto hint = [&](const std::vector<std::string>& words) { return unknown_option(words, options); };

@@ -303,10 +303,10 @@ TEST_P(InstanceWishes, AreNotWaitedForByCommandsThatTheProcessCarriesOut) {
   answer(ErrorCode::ok, "'speed' is forced");
   EXPECT_EQ(take_reply().text, "'speed' is forced");
   ask(ControlVerb::stop);
-  answer(ErrorCode::ok, "1 halted tasks were let go first");
+  answer(ErrorCode::ok, "1 halted task was let go first");
   ASSERT_EQ(wishes_.waiting.size(), 1U);
   wishes_.waiting.front()("");
-  EXPECT_EQ(take_reply().text, "line1: stopped; 1 halted tasks were let go first");
+  EXPECT_EQ(take_reply().text, "line1: stopped; 1 halted task was let go first");
 }
 
 TEST_P(InstanceWishes, TellOfForcesThatEndedWhileNoManagerRan) {

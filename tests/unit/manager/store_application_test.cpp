@@ -19,7 +19,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-constexpr const char* kValid = "echo \"$2 is a valid application: Lamp, 1 tasks\"";
+constexpr const char* kValid = "echo \"$2 is a valid application: Lamp, 1 task\"";
 
 class StoreApplication : public testing::Test {
  protected:

@@ -330,7 +330,7 @@ TEST(ObjectTraits, RefuseAnInitialValueThatATypeDoesNotHave) {
   const auto event = pool.create_object<SharedEvent>("e", 1);
   ASSERT_FALSE(event);
   EXPECT_EQ(event.error().code, ErrorCode::invalid_argument);
-  EXPECT_EQ(event.error().message, "event 'e': 1 posts; allowed are 0 to 0");
+  EXPECT_EQ(event.error().message, "event 'e': posts 1; allowed are 0 to 0");
   EXPECT_FALSE(pool.create_object<SharedMemory>("m", 0));
   EXPECT_FALSE(pool.look_at("e"));
 }

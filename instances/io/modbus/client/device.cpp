@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "instances/io/modbus/threads/poll_schedule.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost::modbus {
@@ -59,8 +60,8 @@ void Device::run() {
   }
   make_safe();
   if (schedule.skipped() != 0) {
-    spdlog::info("device '{}': {} polls were skipped because the one before took too long", config_.name,
-                 schedule.skipped());
+    spdlog::info("device '{}': {} skipped because the one before took too long", config_.name,
+                 count_text(schedule.skipped(), "poll was", "polls were"));
   }
   has_ended_ = true;
 }
