@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <topic_names.hpp>
 
@@ -106,10 +107,7 @@ std::string criteria(std::string_view what, const std::vector<Grant>& grants) {
 }
 
 std::string time_text(std::time_t time) {
-  std::tm parts{};
-  ::gmtime_r(&time, &parts);
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
-                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}", fmt::gmtime(time));
 }
 
 }  // namespace

@@ -65,10 +65,7 @@ fi
 # The root has all that the packages depend on: the machine has no network.
 if [ ! -e "$root/made" ]; then
   rm -rf "$root"
-  archive=$({ cat /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2>/dev/null || true; } |
-    sed -n 's/^URIs: *//p; s/^deb \(\[[^]]*\] \)\?\([^ ]*\).*/\2/p' | grep -m1 '/debian/\?$') || cannot "apt's sources name no Debian archive"
-  debootstrap --variant=minbase --include="$machine_packages" "$suite" "$root" "$archive" >"$log" 2>&1 ||
-    cannot "$(tail -n 1 "$log")"
+  .ci/debian_root "$suite" "$root" "$machine_packages" >"$log" 2>&1 || cannot "$(tail -n 1 "$log")"
   touch "$root/made"
 fi
 rm -f "$root/etc/resolv.conf"
