@@ -79,8 +79,9 @@ void Manager::share_folders() {
     return share_with_instances(folder, user);
   };
   const auto answered = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
-  const auto shared = and_then(answered, [](const Result<void>& done) { return done; });
-  if (!shared) spdlog::error("instances may lack [host] state_directory: {}", shared.error().describe());
+  const auto state_shared = and_then(answered, [](const Result<void>& done) { return done; });
+  if (!state_shared)
+    spdlog::error("instances may lack [host] state_directory: {}", state_shared.error().describe());
 }
 
 void Manager::prepare_files(const std::string& instance) {
