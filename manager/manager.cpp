@@ -20,6 +20,7 @@
 #include "manager/pool_rights.hpp"
 #include "manager/retain_memories.hpp"
 #include "manager/store/store_process.hpp"
+#include "manager/supervisor/instance_files.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/service_manager.hpp"
@@ -56,9 +57,15 @@ Result<void> make_run_directory(const std::string& path) {
 }
 
 // In the folder nobody has a file but this user, root, and instances with a user of their own.
-Result<LockFile> take_lock(const std::string& path) {
+Result<LockFile> take_lock(const std::string& path, const std::string& instance_user) {
   auto lock = LockFile::take(path);
   if (lock || lock.error().code != ErrorCode::refused) return lock;
+  put_folder_aside(path);
+  // An instance keeps no manager from its start. A manager of another user does.
+  const auto of_instances = user_number(instance_user);
+  const auto holder = user_that_holds(path);
+  if (holder && !(of_instances && *of_instances == *holder))
+    return failure(ErrorCode::already_exists, fmt::format("a process of user {} holds {}", *holder, path));
   spdlog::warn("{}; it is removed and not used", lock.error().describe());
   PLCHOST_TRY(take_away(path));
   return LockFile::take(path);
@@ -121,7 +128,7 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
 
 Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Options options) {
   PLCHOST_TRY(make_run_directory(config.host.run_directory));
-  auto lock = take_lock(config.host.run_directory + "/manager.lock");
+  auto lock = take_lock(config.host.run_directory + "/manager.lock", config.host.instance_user);
   if (!lock && lock.error().code == ErrorCode::already_exists) {
     return failure_in("another manager runs with this run directory", lock.error());
   }
@@ -186,6 +193,7 @@ Result<void> Manager::set_up() {
       ConfigReload::Settings{
           .file = options_.file, .program = "/proc/self/exe", .programs = options_.programs},
       *host_check_, [this] { return reload(); });
+  put_folder_aside(manager_socket_path(host.run_directory));
   PLCHOST_TRY_ASSIGN(command_server_,
                      CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *reload_));
   return {};

@@ -82,12 +82,13 @@ Result<void> share_folder(const std::string& path, GroupRight right, std::option
 }
 
 Result<void> keep_folder(const std::string& path) {
+  if (::mkdir(path.c_str(), S_IRWXU) != 0 && errno != EEXIST)
+    return failure(ErrorCode::system, "cannot create folder " + path, errno);
   const UniqueFd fd(::open(path.c_str(), kFolderFlags));
-  if (!fd && errno == ENOENT) return {};
   struct stat status{};
   if (!fd || ::fstat(fd.get(), &status) != 0)
     return failure(ErrorCode::system, "cannot open folder " + path, errno);
-  const mode_t kept = status.st_mode & 0755U;
+  const mode_t kept = status.st_mode & mode_t{S_IRWXU};
   PLCHOST_TRY(check_errno(::fchmod(fd.get(), kept), "cannot set the rights of " + path));
   return {};
 }

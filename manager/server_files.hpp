@@ -19,7 +19,7 @@ enum class GroupRight : bool { reads, writes };
 [[nodiscard]] Result<void> share_folder(const std::string& path, GroupRight right,
                                         std::optional<gid_t> folders_group = std::nullopt);
 
-/// Takes the right to write a folder from its group. It is well if there is none.
+/// Takes all rights to a folder from all other users. Makes it if it is not there; the folder above must be.
 [[nodiscard]] Result<void> keep_folder(const std::string& path);
 
 }  // namespace plchost

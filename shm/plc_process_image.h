@@ -19,8 +19,7 @@
  * publishes it. The reader copies the latest and looks whether it was overtaken meanwhile, which takes the
  * writer PLC_IMAGE_SLOTS - 2 publications.
  *
- * Inputs are copied in at the start of a task's cycle, outputs out at its end. The stamp tells when an image
- * was published.
+ * Inputs are copied in at a cycle's start, outputs out at its end. The stamp tells when it was published.
  *
  * The dead-man word tells what the writer does, also after its end: plc_image_state(). An instance has a safe
  * image beside its outputs ([SysMem] Linux.Area.n.SafeState). While no task drives the outputs,
@@ -32,9 +31,7 @@
  *
  * The file is a memory of the pool. It is an object like all others once anybody opens it by name there, or
  * the manager has looked, provided that its owner may write the pool.
- *
- * If the file is removed, an instance's next start or the next plc_image_open makes it anew: see
- * plc_image_gone().
+ * If the file is removed, the next start or plc_image_open makes it anew: see plc_image_gone().
  */
 #ifndef PLC_PROCESS_IMAGE_H
 #define PLC_PROCESS_IMAGE_H
@@ -70,8 +67,7 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 #define PLC_IMAGE_SAFE_SLOTS 2u              /* behind them: the safe image, and the next one */
 #define PLC_IMAGE_MAX_SIZE 1048576u          /* bytes of inputs or outputs in one image */
 
-/* The dead-man word: the state of the writer in the lowest 8 bits, then whether its safe image is shown. The
- * rest counts the changes. */
+/* The dead-man word: the state in the lowest 8 bits, whether the safe image is shown, a count of changes. */
 #define PLC_IMAGE_STATE 0xffUL
 #define PLC_IMAGE_SHOWS_SAFE 0x100UL
 #define PLC_IMAGE_ONE_CHANGE 0x10000UL
@@ -474,6 +470,7 @@ static __inline__ void plc_image_tell_nothing(const plc_image* image) {
  */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
                                      plc_image* image) {
+  const int flags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
   char path[PLC_IMAGE_PATH_SIZE];
   int error = plc_image_path(pool, name, path);
   memset(image, 0, sizeof *image);
@@ -482,7 +479,10 @@ static __inline__ int plc_image_open(const char* pool, const char* name, unsigne
   if (size == 0 || size > PLC_IMAGE_MAX_SIZE) return EINVAL;
   image->size = size;
   image->mapped = plc_image_bytes(size);
-  image->descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0660);
+  image->descriptor = open(path, flags); /* a file of another user opens only without the flag to make it */
+  if (image->descriptor < 0 && errno == ENOENT)
+    image->descriptor = open(path, flags | O_CREAT | O_EXCL, 0660);
+  if (image->descriptor < 0 && errno == EEXIST) image->descriptor = open(path, flags);
   if (image->descriptor < 0) return errno;
   if (access == PLC_IMAGE_WRITE && flock(image->descriptor, LOCK_EX | LOCK_NB) != 0)
     error = errno == EWOULDBLOCK ? EBUSY : errno;

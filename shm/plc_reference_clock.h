@@ -171,6 +171,7 @@ static __inline__ int plc_reference_clock_is_one(const plc_reference_clock* cloc
  */
 static __inline__ int plc_reference_clock_open(const char* pool, const char* name,
                                                plc_reference_clock** clock) {
+  const int flags = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
   char path[256];
   struct stat status;
   void* memory;
@@ -179,7 +180,9 @@ static __inline__ int plc_reference_clock_open(const char* pool, const char* nam
   if (pool[0] == '\0' || name[0] == '\0') return EINVAL;
   if (snprintf(path, sizeof path, PLC_REFERENCE_CLOCK_PATH, pool, name) >= (int)sizeof path)
     return ENAMETOOLONG;
-  descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0660);
+  descriptor = open(path, flags); /* a file of another user opens only without the flag to make it */
+  if (descriptor < 0 && errno == ENOENT) descriptor = open(path, flags | O_CREAT | O_EXCL, 0660);
+  if (descriptor < 0 && errno == EEXIST) descriptor = open(path, flags);
   if (descriptor < 0) return errno;
   if (fstat(descriptor, &status) != 0) error = errno;
   if (error == 0 && status.st_size == 0) (void)fchmod(descriptor, 0660); /* under any umask */

@@ -172,7 +172,8 @@ class ControlClient {
 
   /// One post with the least latency: one dds_write, not repeated, not waited for. prepare_posts() first. It
   /// needs no credit of the host, as nothing is kept to be repeated. The host rejects it after `patience`.
-  /// timed_out: DDS had no room within 20 ms. unavailable: 1024 other hosts were seen since this one was.
+  /// After a rest, up to 26 ms earlier: a shorter `patience` is of no use. timed_out: DDS had no room within
+  /// 20 ms. unavailable: 1024 other hosts were seen since this one was.
   [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
                                       std::string_view event, Duration patience = kDefaultTimeout);
 

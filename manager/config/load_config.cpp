@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "manager/config/accounts.hpp"
 #include "manager/config/check_relations.hpp"
 #include "manager/config/config_table.hpp"
 #include "shm/base/names.hpp"
@@ -35,6 +36,7 @@ struct Loader {
   void read_instances(const TomlValue& value);
   void read_instance(const TomlTable& table, unsigned line);
   void complete_cores();
+  void check_user(SectionReader& reader);
   void check_identity(SectionReader& reader);
   void check_instance(SectionReader& reader, const InstanceConfig& instance);
   void check_start(SectionReader& reader, const InstanceConfig& instance);
@@ -99,6 +101,18 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
   SectionReader reader(table, line, "[dds]", problems);
   read_keys(dds_keys(), reading(), reader, config.dds);
   check_identity(reader);
+  check_user(reader);
+}
+
+// After [host], which it needs. The audit log and the manager are closed to instances, not to the server.
+void Loader::check_user(SectionReader& reader) {
+  const std::string& instances = config.host.instance_user;
+  if (config.dds.user.empty() || instances.empty() || reader.wrong("user")) return;
+  const auto server = user_number(config.dds.user);
+  const auto theirs = user_number(instances);
+  if (server && theirs && *server == *theirs) {
+    reader.problem("user", "is the user of instances, too; give [host] instance_user another one");
+  }
 }
 
 void Loader::check_identity(SectionReader& reader) {

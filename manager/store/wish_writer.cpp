@@ -11,13 +11,11 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/epoll.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "manager/store/wish_folder.hpp"
 #include "manager/system/take_packets.hpp"
-#include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/read_plain_file.hpp"
 #include "shm/files/replace_file.hpp"
 
 namespace plchost {
@@ -47,22 +45,7 @@ std::array<std::string, 4> parts_of(std::string_view packet) {
 // An instance has written it, which may be another user: a link could lead to a file of ours.
 Result<std::string> read_events(const std::string& path) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // 4096 names
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  struct stat status{};
-  if (!fd || ::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "cannot open " + path, errno);
-  if (!S_ISREG(status.st_mode) || status.st_nlink != 1)
-    return failure(ErrorCode::wrong_type, path + " is no plain file of one name");
-  std::string text(kMostBytes, '\0');
-  std::size_t length = 0;
-  while (length < text.size()) {
-    PLCHOST_TRY_ASSIGN(
-        const auto got,
-        check_errno(::read(fd.get(), text.data() + length, text.size() - length), "cannot read " + path));
-    if (got == 0) break;
-    length += static_cast<std::size_t>(got);
-  }
-  text.resize(length);
-  return text;
+  return read_plain_file(path, kMostBytes);
 }
 
 Result<void> carry_out_order(const WishOrder& order) {

@@ -35,6 +35,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   if (operation_ && operation_->of_predecessor && checked.verb == operation_->request.verb) {
     operation_->request.number = request.number;  // the client asks again for what goes on already
     operation_->reply = std::move(reply);
+    operation_->of_predecessor = false;
     return;
   }
   if (!makes_room_for(checked.verb)) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <string_view>
 #include <utility>
@@ -14,6 +15,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "shm/base/system_call.hpp"
+#include "shm/base/time.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/memory_rights.hpp"
@@ -56,8 +58,13 @@ bool is_held(const std::string& path, const struct stat& status) {
   return fd && ::fcntl(fd.get(), F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
 }
 
+std::unexpected<Error> no_rights_of(uid_t user) {
+  return failure(ErrorCode::refused, fmt::format("cannot open files as user {}", user));
+}
+
 Result<std::string> read_as_owner(const std::string& path, const struct stat& status) {
   const FilesAsUser rights(status.st_uid, status.st_gid);
+  if (!rights.can()) return no_rights_of(status.st_uid);
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   struct stat now{};
   if (!fd || ::fstat(fd.get(), &now) != 0) return failure(ErrorCode::system, "cannot open " + path, errno);
@@ -76,6 +83,7 @@ Result<std::string> read_as_owner(const std::string& path, const struct stat& st
 
 Result<void> write_as(const UserAccount& user, const std::string& path, std::string_view text, mode_t mode) {
   const FilesAsUser rights(user.number, user.group);
+  if (!rights.can()) return no_rights_of(user.number);
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
   if (!fd) return failure(ErrorCode::system, "cannot make " + path, errno);
   while (!text.empty()) {
@@ -144,11 +152,13 @@ Result<void> share_with_instances(const std::string& folder, const InstanceUser&
     if ((status.st_mode & kModeBits) != kShared || status.st_uid != ::geteuid()) return {};
     return give_rights(fd.get(), {.group = ::getegid(), .mode = kManagersOnly}, folder);
   }
+  // The manager's group, which instances have, too. Of a folder with another group systemd changes the owner
+  // of all files at each start.
+  if ((status.st_mode & kModeBits) == kShared && status.st_gid == ::getegid()) return {};
   // First the mode: files of others in it are out of reach before the group has it.
-  const FilesAsUser in_its_group(::geteuid(), user->group);
   PLCHOST_TRY(
       check_errno(::fchmod(fd.get(), kShared & ~mode_t{S_IWGRP}), "cannot set the rights of " + folder));
-  return give_rights(fd.get(), {.group = user->group, .mode = kShared}, folder);
+  return give_rights(fd.get(), {.group = ::getegid(), .mode = kShared}, folder);
 }
 
 std::vector<uid_t> users_in(const std::string& run_directory) {
@@ -199,14 +209,35 @@ void hand_over_retain_files(const std::string& state_directory, const std::strin
   }
 }
 
+std::optional<uid_t> user_that_holds(const std::string& path) {
+  const auto file = plain_file(path);
+  return file && is_held(path, *file) ? std::optional(file->st_uid) : std::nullopt;
+}
+
+void put_folder_aside(const std::string& path) {
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0 || !S_ISDIR(status.st_mode)) return;
+  // A name that nobody can have taken before.
+  const std::string aside = fmt::format("{}.old.{}", path, MonotonicClock::now().time_since_epoch().count());
+  const auto renamed =
+      check_errno(::renameat2(AT_FDCWD, path.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE),
+                  "cannot rename folder " + path);
+  if (!renamed) return spdlog::error("{}", renamed.error().describe());
+  spdlog::warn("{} was a folder of user {}; it is renamed to {}", path, status.st_uid, aside);
+}
+
 void end_outputs_of(const std::string& pool, const std::string& instance) {
   const std::string path = MemoryFile::path(outputs_page_name(pool, instance));
   const auto page = plain_file(path);
   if (!page || is_own_or_roots(page->st_uid) || !is_trusted_owner(page->st_uid)) {
-    return end_outputs(pool, instance);
+    return end_outputs(pool, instance, is_own_or_roots);  // not what that user has put there meanwhile
   }
   const FilesAsUser rights(page->st_uid, page->st_gid);
-  end_outputs(pool, instance);
+  if (!rights.can()) {
+    return spdlog::warn("instance {}: its outputs stay as they are: {}", instance,
+                        no_rights_of(page->st_uid).error().describe());
+  }
+  end_outputs(pool, instance, [&page](uid_t owner) { return owner == page->st_uid; });
 }
 
 }  // namespace plchost

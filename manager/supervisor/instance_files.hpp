@@ -33,6 +33,12 @@ void hand_over_files(const LeftFiles& left, const InstanceUser& user);
 void hand_over_retain_files(const std::string& state_directory, const std::string& instance,
                             const InstanceUser& user);
 
+/// The owner of a lock file that a process has locked. Nothing: nobody has, or it is no plain file.
+[[nodiscard]] std::optional<uid_t> user_that_holds(const std::string& path);
+/// Renames a folder in the place of a file of the manager, in the same folder, and logs it. The user of
+/// instances may have made it, with files that cannot be removed.
+void put_folder_aside(const std::string& path);
+
 /// end_outputs() with the rights of the user whose page it is: it names devices and files.
 void end_outputs_of(const std::string& pool, const std::string& instance);
 

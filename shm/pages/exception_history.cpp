@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "shm/files/read_plain_file.hpp"
 #include "shm/files/replace_file.hpp"
 #include "shm/log/log.hpp"
 
@@ -97,20 +95,11 @@ std::string exception_path(std::string_view run_directory, std::string_view inst
 }
 
 Result<ExceptionHistory> read_exceptions(const std::string& path) {
-  std::error_code ignored;
-  const auto type = std::filesystem::status(path, ignored).type();
-  if (type == std::filesystem::file_type::not_found) return ExceptionHistory{};
-  // A file that would make the open wait for ever is not opened.
-  if (type != std::filesystem::file_type::regular && type != std::filesystem::file_type::none) {
-    return corrupt(path, "is not a regular file");
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return failure(ErrorCode::system, "cannot open " + path, errno);
-  std::string text(kMaxFile + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMaxFile) return corrupt(path, "is larger than any history of exceptions");
-  const Json json = Json::parse(text, nullptr, false);
+  const auto text = read_plain_file(path, kMaxFile);
+  if (!text && text.error().code == ErrorCode::not_found) return ExceptionHistory{};
+  if (!text && text.error().code == ErrorCode::wrong_type) return corrupt(path, "is no plain file");
+  PLCHOST_TRY(text);
+  const Json json = Json::parse(*text, nullptr, false);
   if (!json.is_object()) return corrupt(path, "is not a JSON object");
   try {
     if (json.value("version", 0) != kVersion) return corrupt(path, "is of another version");

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
+#include <memory>
 #include <new>
 
 #include <fcntl.h>
@@ -74,6 +76,14 @@ void fill_outputs(std::span<std::byte> bytes, std::span<const LeftOutputs> outpu
     at += one.values.size();
   }
   describe_page(page, kOutputsKind, bytes.size());
+}
+
+// The process that writes the page may change it at any time: all is checked and used in this copy. The
+// values are only copied on.
+std::unique_ptr<const OutputsLayout> copy_of_layout(std::span<const std::byte> bytes) {
+  auto copy = std::make_unique<OutputsLayout>(*reinterpret_cast<const OutputsLayout*>(bytes.data()));
+  std::atomic_signal_fence(std::memory_order_seq_cst);  // the compiler reads nothing there again
+  return copy;
 }
 
 bool is_whole_page(const OutputsLayout& page, std::size_t bytes) {
@@ -161,18 +171,20 @@ void OutputsPage::remove(std::string_view pool, std::string_view instance) noexc
   MemoryFile::remove(outputs_page_name(pool, instance));
 }
 
-void end_outputs(std::string_view pool, std::string_view instance) {
+void end_outputs(std::string_view pool, std::string_view instance, const OwnerCheck& owners) {
   const std::string name = outputs_page_name(pool, instance);
-  const auto memory = open_page<OutputsLayout>(name, kOutputsKind, MemoryFile::Access::read_only);
+  const auto memory = open_of_magic<OutputsLayout>(name, kOutputsKind, MemoryFile::Access::read_only, owners);
   if (!memory) {
     if (memory.error().code != ErrorCode::not_found)
       spdlog::warn("instance {}: its outputs stay as they are: {}", instance, memory.error().describe());
     return;
   }
   const std::span<const std::byte> bytes = memory->bytes();
-  const auto& page = *reinterpret_cast<const OutputsLayout*>(bytes.data());
+  const auto copy = copy_of_layout(bytes);
+  const OutputsLayout& page = *copy;
   if (!is_whole_page(page, bytes.size())) {
-    spdlog::warn("instance {}: its outputs stay as they are: {} is damaged", instance, name);
+    spdlog::warn("instance {}: its outputs stay as they are: {} is damaged, or of another version", instance,
+                 name);
     return;
   }
   if (!process_has_ended({.pid = static_cast<pid_t>(page.pid), .image = page.program, .start = page.start}))

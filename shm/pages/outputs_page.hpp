@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "shm/base/result.hpp"
+#include "shm/files/memory_rights.hpp"
 
 namespace plchost {
 
@@ -52,7 +53,9 @@ class OutputsPage {
 
 /// Puts the outputs of an instance whose process has ended into their safe state, and removes its page. If
 /// there is none, the process has done so itself, or has no outputs; while it runs, nothing is done.
-/// Outputs that cannot be put there are logged. Takes microseconds for images. Set-up.
-void end_outputs(std::string_view pool, std::string_view instance);
+/// Outputs that cannot be put there are logged. A page of another owner than `owners` is not used. Takes
+/// microseconds for images. Set-up.
+void end_outputs(std::string_view pool, std::string_view instance,
+                 const OwnerCheck& owners = is_trusted_owner);
 
 }  // namespace plchost

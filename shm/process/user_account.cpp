@@ -79,8 +79,10 @@ FilesAsUser::FilesAsUser(uid_t user, gid_t group) noexcept
     : groups_(groups_of_thread()), before_(::geteuid()), dumpable_(::prctl(PR_GET_DUMPABLE, 0, 0, 0, 0)) {
   std::vector<gid_t> more = groups_;
   more.push_back(group);
-  (void)::syscall(SYS_setgroups, more.size(), more.data());
+  const bool in_group = ::syscall(SYS_setgroups, more.size(), more.data()) == 0;
+  constexpr auto kNobody = static_cast<uid_t>(-1);  // changes nothing, and tells the user of now
   (void)::syscall(SYS_setfsuid, user);
+  can_ = in_group && static_cast<uid_t>(::syscall(SYS_setfsuid, kNobody)) == user;
 }
 
 FilesAsUser::~FilesAsUser() {

@@ -32,11 +32,14 @@ class FilesAsUser {
   ~FilesAsUser();
   FilesAsUser(const FilesAsUser&) = delete;
   FilesAsUser& operator=(const FilesAsUser&) = delete;
+  /// Whether the change took: else the thread opens files with rights that it should not use here.
+  [[nodiscard]] bool can() const noexcept { return can_; }
 
  private:
   std::vector<gid_t> groups_;
   uid_t before_;
   int dumpable_;
+  bool can_ = false;
 };
 
 }  // namespace plchost

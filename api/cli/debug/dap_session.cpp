@@ -335,9 +335,12 @@ DapSession::Answer DapSession::go_on(const std::string& command, const Json& arg
   return Json::object();
 }
 
-// The end of the step halts them again.
+// The end of the step halts them again. A step that will be refused lets none of them go.
 Result<void> DapSession::let_others_go(const std::string& task) {
   PLCHOST_TRY_ASSIGN(state_, link_.state());
+  const Json* const own = task_in(state_, task);
+  if (own == nullptr || own->value("state", "") != "halted")
+    return failure(ErrorCode::wrong_state, fmt::format("task '{}' does not halt", shown(task)));
   for (const Json& other : state_.value("tasks", Json::array())) {
     const std::string name = other.value("task", "");
     if (name == task || other.value("state", "") != "halted") continue;

@@ -57,7 +57,7 @@ class DapSession {
   [[nodiscard]] Answer set_variable(const Json& arguments);
   [[nodiscard]] Answer evaluate(const Json& arguments);
   [[nodiscard]] Answer go_on(const std::string& command, const Json& arguments);
-  /// Those that halt, but for this task.
+  /// Those that halt, but for this task. wrong_state: it does not halt itself; no task is let go.
   [[nodiscard]] Result<void> let_others_go(const std::string& task);
   [[nodiscard]] Answer pause(const Json& arguments);
   /// The value that a name means in a frame.

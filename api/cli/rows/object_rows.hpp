@@ -22,7 +22,7 @@ namespace plchost {
 /// `value` and `by` put several members of a record together, so control.idl has no columns for it.
 [[nodiscard]] const std::vector<Column>& object_columns();
 
-/// The changing part of an object, in words: "12 posts, registered, 1 tasks", "held by demo(4711), thread
+/// The changing part of an object, in words: "12 posts, registered, 1 task", "held by demo(4711), thread
 /// 4713".
 [[nodiscard]] std::string state_text(const ListedObject& object);
 /// The processes with references on it: "plc-instance(4711), python3(88) and 5 more".

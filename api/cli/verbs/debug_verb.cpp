@@ -28,10 +28,18 @@ struct DebugArguments {
   bool take = false;
 };
 
-// The lines of standard input, until its end or "quit". In between the tasks that halt are told.
-Result<void> read_commands(DebugConsole& console) {
+// Asks for the state, and tells nothing of it: the command "wait" does not count halts that were told before.
+Result<void> keep_session(DebugLink& link) {
+  PLCHOST_TRY(link.state());
+  return {};
+}
+
+// The lines of standard input, until its end or "quit". If no line comes for 100 ms, the tasks that have
+// halted are told.
+Result<void> read_commands(DebugLink& link, DebugConsole& console) {
   constexpr int kIdleMs = 100;
-  TimePoint next_look;
+  constexpr auto kKeep = std::chrono::seconds(2);
+  TimePoint next_keep;
   const bool terminal = ::isatty(STDIN_FILENO) != 0;
   std::string pending;
   bool prompt = terminal;
@@ -44,10 +52,11 @@ Result<void> read_commands(DebugConsole& console) {
     const int found = ::poll(&ready, 1, kIdleMs);
     if (interrupted()) return {};
     // Also between lines that ask for nothing, as comments: else the session would be over.
-    if (const TimePoint now = MonotonicClock::now(); found <= 0 || now >= next_look) {
-      next_look = now + std::chrono::milliseconds(kIdleMs);
+    if (const TimePoint now = MonotonicClock::now(); found <= 0 || now >= next_keep) {
+      next_keep = now + kKeep;
       // A state that changes all the time is looked at again.
-      if (auto seen = console.look(); !seen && seen.error().code != ErrorCode::busy) return seen;
+      const auto seen = found <= 0 ? console.look() : keep_session(link);
+      if (!seen && seen.error().code != ErrorCode::busy) return seen;
     }
     if (found <= 0) continue;
     std::array<char, 4096> bytes{};
@@ -73,7 +82,7 @@ int run_console(DebugLink& link, const DebugArguments& arguments) {
   if (!remark->empty()) fmt::print("{}\n", printable(*remark));
   DebugConsole console(link);
   Result<void> done;
-  if (arguments.commands.empty()) done = read_commands(console);
+  if (arguments.commands.empty()) done = read_commands(link, console);
   for (const std::string& command : arguments.commands) {
     if (!console.obey(command) || console.failed()) break;
   }

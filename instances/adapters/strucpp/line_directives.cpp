@@ -17,9 +17,10 @@ std::string_view first_word(std::string_view text) {
 }
 
 // The POU whose code begins in such a line: "class Program_MAIN : public ProgramBase {",
-// "void COUNTER::operator()() {", "IEC_INT TWICE(IEC_INT X) {"; empty: none does.
+// "void COUNTER::operator()() {", "IEC_INT TWICE(IEC_INT X) {", "IEC_INT TWICE(IEC_INT X);"; empty: none
+// does.
 std::string_view pou_that_begins(std::string_view line) {
-  if (line.empty() || line.front() == ' ' || !line.ends_with('{')) return {};
+  if (line.empty() || line.front() == ' ' || !(line.ends_with('{') || line.ends_with(");"))) return {};
   std::string_view name;
   if (constexpr std::string_view kClass = "class "; line.starts_with(kClass)) {
     name = first_word(line.substr(kClass.size()));

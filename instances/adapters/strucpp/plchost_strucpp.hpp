@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <exception>
+#include <initializer_list>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -72,6 +73,12 @@ template <class T, class... Values>
 inline void plchost_renew(T& variable, Values&&... values) {
   std::destroy_at(&variable);
   ::new (static_cast<void*>(&variable)) T(std::forward<Values>(values)...);
+}
+// Of an array: "{1, 2, 3}" has no type of its own.
+template <class T, class Element>
+inline void plchost_renew(T& variable, std::initializer_list<Element> elements) {
+  std::destroy_at(&variable);
+  ::new (static_cast<void*>(&variable)) T(elements);
 }
 
 // The part of a copy that is exchanged at a time: of an array an element. Not evaluated.

@@ -52,10 +52,19 @@ std::optional<std::string_view> class_of_body(std::string_view line) {
   return std::nullopt;
 }
 
-/// The class of "COUNTER::COUNTER()".
+/// The class of "COUNTER::COUNTER()", and of "Program_MAIN::Program_MAIN(GlobalVar<IEC_INT>* G_ref)", which
+/// has external variables.
 std::optional<std::string_view> class_of_constructor(std::string_view line) {
   const std::string_view name = line.substr(0, line.find("::"));
-  return !name.empty() && line == fmt::format("{0}::{0}()", name) ? std::optional(name) : std::nullopt;
+  if (name.empty() || !line.starts_with(fmt::format("{0}::{0}(", name)) || !line.ends_with(')'))
+    return std::nullopt;
+  return name;
+}
+
+/// The initial values of a constructor, in the code behind its first line. Without any, its body begins
+/// there.
+std::string_view list_at(std::string_view code) {
+  return code.starts_with("    : ") ? code.substr(0, code.find("\n{")) : std::string_view();
 }
 
 const iec::Pou* pou_of(const iec::Project& project, std::string_view type) {
@@ -77,7 +86,7 @@ class Renewer {
       made += line;
       if (line.ends_with('\n')) line.remove_suffix(1);
       if (const auto type = class_of_constructor(line)) {
-        values_[std::string(*type)] = initial_values(code.substr(0, code.find("\n{")));
+        values_[std::string(*type)] = initial_values(list_at(code));
       } else if (const auto body = class_of_body(line)) {
         const bool has_end = made.ends_with('\n');
         if (has_end) made.pop_back();

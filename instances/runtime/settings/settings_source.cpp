@@ -3,12 +3,13 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "instances/runtime/settings/settings.hpp"
+#include "shm/files/read_plain_file.hpp"
 #include "shm/files/replace_file.hpp"
 
 namespace plchost {
@@ -20,6 +21,7 @@ using Json = nlohmann::json;
 
 // The manager's group reads it: a process of another user may be the next one.
 constexpr mode_t kKeptMode = 0640;
+constexpr std::size_t kMaxKept = 2 * kMaxSettingsFiles * kMaxSettingsFile;  // with room for names
 
 Result<std::string> read_text(const std::string& file) {
   std::error_code error;
@@ -82,9 +84,8 @@ Result<KeptSettings> read_kept_settings(const std::string& path) {
   const auto corrupt = [&] {
     return failure(ErrorCode::corrupt, fmt::format("{} does not hold kept settings", path));
   };
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return failure(ErrorCode::not_found, fmt::format("cannot open kept settings {}", path), errno);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
+  // Read as root, in a folder that the user of instances can write.
+  PLCHOST_TRY_ASSIGN(const std::string bytes, read_plain_file(path, kMaxKept));
   const Json json = Json::from_cbor(bytes, true, false);
   if (!json.is_object() || !json.contains("file") || !json["file"].is_string() || !json.contains("texts") ||
       !json["texts"].is_object()) {

@@ -38,9 +38,8 @@ Result<void> keep_real_time_rights(bool priorities, bool memory) {
 // A pool for the group of firmware is for instances, too.
 void add_group_of(const std::string& pool, UserAccount& user) {
   struct stat status{};
-  if (::stat(MemoryFile::path(pool).c_str(), &status) == 0 && status.st_gid != 0) {
-    user.groups.push_back(status.st_gid);
-  }
+  const bool plain = ::lstat(MemoryFile::path(pool).c_str(), &status) == 0 && S_ISREG(status.st_mode);
+  if (plain && status.st_gid != 0) user.groups.push_back(status.st_gid);
 }
 
 }  // namespace

@@ -111,7 +111,7 @@ Result<NameClaim> claim_name(const LaunchOptions& launch) {
   } else if (in_pool.error().code == ErrorCode::already_exists) {
     return taken(in_pool.error());
   } else if (claim.in_run_directory) {
-    // Nobody else writes into the run directory: the name is ours without the other one.
+    // Only the manager and instances write into the run directory: the name is ours without the other one.
     spdlog::warn("{}", in_pool.error().describe());
   } else {
     return std::unexpected(in_pool.error());

@@ -51,23 +51,31 @@ std::optional<ProcessorGuard::Taker> LongRunSearch::look(TimePoint now) {
   std::array<pid_t, kMost> found{};
   const std::size_t count = times_.real_time_threads(found);
   std::map<pid_t, Run> before = std::exchange(runs_, {});
-  std::optional<ProcessorGuard::Taker> taker;
+  // Of several that have no pause, it is the one that runs most: the others wait for it.
+  struct Longest {
+    pid_t thread = 0;
+    Duration used = Duration::zero();
+    Duration lasted{};
+  } longest;
   for (const pid_t thread : std::span(found).first(count)) {
+    const Duration used = times_.of_thread(thread);
     // Others that take the processor from it give it no pause.
-    const Duration busy = times_.of_thread(thread) + times_.ready_time_of_thread(thread);
-    const Run anew{.began = now, .busy_before = busy};
+    const Duration busy = used + times_.ready_time_of_thread(thread);
+    const Run anew{.began = now, .busy_before = busy, .used_before = used};
     const auto known = before.find(thread);
     Run run = known != before.end() ? known->second : anew;
     const Duration lasted = now - run.began;
     if (busy - run.busy_before < lasted - lasted / kPart) run = anew;
-    if (now - run.began > limit_ && !taker && concerns_(thread)) {
-      if (const ThreadText who = times_.demote(thread); !who.view().empty()) {
-        taker = {.who = who, .lasted = now - run.began};
-      }
+    const Duration ran = used - run.used_before;
+    if (now - run.began > limit_ && ran > longest.used && concerns_(thread)) {
+      longest = {.thread = thread, .used = ran, .lasted = now - run.began};
     }
     runs_.emplace(thread, run);
   }
-  return taker;
+  if (longest.thread == 0) return std::nullopt;
+  const ThreadText who = times_.demote(longest.thread);
+  if (who.view().empty()) return std::nullopt;
+  return ProcessorGuard::Taker{.who = who, .lasted = longest.lasted};
 }
 
 SetUpWatch::SetUpWatch(Duration guard, ThreadPriority priority, Fail fail) : fail_(std::move(fail)) {

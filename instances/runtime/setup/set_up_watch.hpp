@@ -40,6 +40,7 @@ class LongRunSearch {
   struct Run {
     TimePoint began;
     Duration busy_before{};  // of the thread, when that began
+    Duration used_before{};  // the part of it in which it had the processor
   };
 
   const ProcessorTimes& times_;

@@ -88,12 +88,13 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
   if (IsSkipped()) return;
   const std::string text =
       "TYPE Mode : (idle, busy); END_TYPE\n"
-      "FUNCTION_BLOCK Adder\nVAR_TEMP part : INT := 5; grid : ARRAY[0..1] OF INT; END_VAR\n"
+      "FUNCTION_BLOCK Adder\nVAR_TEMP part : INT := 5; grid : ARRAY[0..1] OF INT := [1, 2]; END_VAR\n"
       "VAR_OUTPUT sum : INT; END_VAR\n"
       "part := part + 1; grid[1] := grid[1] + part; sum := grid[1];\nEND_FUNCTION_BLOCK\n"
       "PROGRAM Main\nVAR_EXTERNAL shared : INT; END_VAR\n"
       "VAR t1 : STRING; text : STRING := 'ABCDE'; mode1 : Mode := Mode#busy; is_busy : BOOL; cycles : DINT;\n"
-      "adder1 : Adder; marker AT %MW3 : INT; again AT %MB6 : BYTE; END_VAR\nVAR_TEMP own : INT; END_VAR\n"
+      "adder1 : Adder; marker AT %MW3 : INT; again AT %MB6 : BYTE; END_VAR\nVAR_TEMP own : INT := 4; "
+      "END_VAR\n"
       "t1 := INSERT(text, 'xy', 2); text := TIME_TO_STRING(T#1s); text := 'ABCDE'; own := own + 1; shared := "
       "own;\n"
       "CASE mode1 OF Mode#idle: is_busy := FALSE; Mode#busy: is_busy := TRUE; END_CASE;\n"
@@ -117,8 +118,8 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
   }));
   for (const auto& [name, value] : {std::pair{"one.t1", "'ABxyCDE'"},
                                     {"one.is_busy", "TRUE"},
-                                    {"one.adder1.sum", "6"},
-                                    {"shared", "1"},
+                                    {"one.adder1.sum", "8"},
+                                    {"shared", "5"},
                                     {"two.copy", "258"},
                                     {"two.marker", "7"}}) {
     EXPECT_EQ(client.read(name), value) << name;

@@ -47,7 +47,7 @@ class ModbusPeer {
  public:
   static constexpr int kRegisters = 300;
   static constexpr std::uint8_t kOwnException = 0x21;
-  static constexpr std::chrono::milliseconds kSlow{60};
+  static constexpr std::chrono::milliseconds kSlow{30};
   enum class Mode : int {
     normal,
     stalls,          ///< takes requests, and does not answer

@@ -114,6 +114,9 @@ products 3
 
 echo "- it cannot touch the manager, the API server, what they keep, and files of others"
 state=$cell/cell1.state
+for folder in "$cell/cell1" "$state"; do
+  is "$(stat -c '%u %g %a' "$folder")" "0 $group 1771" || fail "the rights of $folder: $(ls -ld "$folder")"
+done
 touch "$cell/others" && chmod 600 "$cell/others"
 for file in "$state/wishes.cell1" "$state/applications.cell1" "$state/applications.cell1/line3" "$state/applications.cell1/line3/000001.so" \
   "$state/audit.cell1" "$cell/cell1/manager.lock" "$cell/others" "/dev/shm/$pool-cell1.host" "/dev/shm/$pool-cell1.wish.line1" \

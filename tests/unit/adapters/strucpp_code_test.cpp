@@ -41,11 +41,50 @@ TEST(TemporariesOfStrucpp, HaveTheirInitialValuesInEachCall) {
       "void Program_MAIN::run() { plchost_renew(B_);\n}\nvoid COUNTER::RESET() {\n}\nvoid OTHER::run() {\n}");
 }
 
+TEST(TemporariesOfStrucpp, OfAProgramWithExternalVariablesHaveTheirInitialValues) {
+  iec::Project project;
+  project.add({.name = "Main", .variables = {temporary("n", "N")}, .chart = "", .place = {}});
+  const std::string constructor =
+      "Program_MAIN::Program_MAIN(GlobalVar<IEC_INT>* G_ref, GlobalVar<IEC_STRING>* H_ref)\n"
+      "    : N(5), G(G_ref), H(H_ref)\n{\n}\n";
+  EXPECT_EQ(with_new_temporaries(constructor + "void Program_MAIN::run() {\n    G->write(N);\n}\n", project),
+            constructor + "void Program_MAIN::run() { plchost_renew(N, 5);\n    G->write(N);\n}\n");
+}
+
+TEST(TemporariesOfStrucpp, ThatAreArraysHaveAllInitialValues) {
+  iec::Project project;
+  project.add(
+      {.name = "Counter", .variables = {temporary("a", "A"), temporary("n", "N")}, .chart = "", .place = {}});
+  const std::string constructor = "COUNTER::COUNTER()\n    : A({1, F(2, 3), 4}), N(5)\n{\n}\n";
+  EXPECT_EQ(with_new_temporaries(constructor + "void COUNTER::operator()() {\n}\n", project),
+            constructor +
+                "void COUNTER::operator()() { plchost_renew(A, {1, F(2, 3), 4}); plchost_renew(N, 5);"
+                "\n}\n");
+}
+
+TEST(TemporariesOfStrucpp, HaveNoInitialValuesOfALaterPou) {
+  iec::Project project;
+  for (const char* const name : {"First", "Second"})
+    project.add({.name = name, .variables = {temporary("n", "N")}, .chart = "", .place = {}});
+  const std::string first = "Program_FIRST::Program_FIRST()\n{\n}\n\n";
+  const std::string second = "Program_SECOND::Program_SECOND()\n    : N(5)\n{\n}\n\n";
+  const std::string first_body = "void Program_FIRST::run() {";
+  const std::string second_body = "void Program_SECOND::run() {";
+  const std::string end = "\n}\n";
+  EXPECT_EQ(
+      with_new_temporaries(first + first_body + end + second + second_body + end, project),
+      first + first_body + " plchost_renew(N);" + end + second + second_body + " plchost_renew(N, 5);" + end);
+  const std::string straight = "Program_FIRST::Program_FIRST()\n" + second;
+  EXPECT_EQ(with_new_temporaries(straight + first_body + end, project),
+            straight + first_body + " plchost_renew(N);" + end)
+      << "also without a body";
+}
+
 TEST(TemporariesOfStrucpp, OfDamagedCodeAreLeftToTheCompiler) {
   iec::Project project;
   project.add({.name = "A", .variables = {temporary("b", "B")}, .chart = "", .place = {}});
   for (const std::string code :
-       {"", "\n", "A::A()", "A::A()\n    : B(", "A::A()\n    : ", "::\n", "void ::run() {"})
+       {"", "\n", "A::A()", "A::A()\n    : B(", "A::A()\n    : ", "A::A(", "A::A)", "::\n", "void ::run() {"})
     EXPECT_EQ(with_new_temporaries(code, project), code);
 }
 
@@ -66,6 +105,14 @@ TEST(LinesOfStrucpp, NameTheFileOfTheirPou) {
             "#line 6 \"main.st\"\n    A B;\n};\n#line 2 \"a.st\"\nvoid A::operator()() {\n"
             "#line 3 \"a.st\"\n#line 4 \"a.st\"\n}\n#line 1 \"t.st\"\nIEC_INT TWICE(IEC_INT X) {\n}\n"
             "#line 9 \"t.st\"\nvoid Configuration_C::run() {\n#line 8 \"a.st\"");
+}
+
+TEST(LinesOfStrucpp, NameTheFileOfADeclaredFunction) {
+  const auto find = [](std::string_view pou) -> std::optional<std::string> {
+    return pou == "TWICE" ? std::optional<std::string>("t.st") : std::nullopt;
+  };
+  EXPECT_EQ(with_files_of_pous("#line 1 \"a.st\"\nIEC_INT TWICE(IEC_INT X);\n", find),
+            "#line 1 \"t.st\"\nIEC_INT TWICE(IEC_INT X);\n");
 }
 
 }  // namespace

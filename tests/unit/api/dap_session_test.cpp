@@ -368,6 +368,20 @@ TEST_F(DapSessionTest, LetsAllTasksGoOnIfTheyHaltTogether) {
               ElementsAre("continue *", "continue fast", "continue slow", "next fast", "step slow"));
 }
 
+TEST_F(DapSessionTest, LetsNoOtherTaskGoOnForAStepOfATaskThatDoesNotHalt) {
+  EXPECT_FALSE(sut_.obey({{"seq", 1}, {"command", "disconnect"}}));
+  instance_.halt("slow", 1, json::array());
+  (void)ask("attach", {{"haltAllTasks", true}});
+  instance_.commands.clear();
+  instance_.tasks[0]["state"] = "runs";
+  for (const char* const step : {"next", "stepIn", "stepOut"}) {
+    const json response = answer(step, {{"threadId", 1}});
+    EXPECT_FALSE(response["success"]) << step;
+    EXPECT_THAT(response.value("message", ""), HasSubstr("task 'fast' does not halt")) << step;
+  }
+  EXPECT_THAT(instance_.commands, IsEmpty());
+}
+
 TEST_F(DapSessionTest, IsAttachedOnce) {
   const json response = answer("attach");
   EXPECT_FALSE(response["success"]);

@@ -96,6 +96,19 @@ TEST_F(ExceptionHistoryTest, IsEmptyWithoutAFile) {
   EXPECT_EQ(history->count, 0U);
 }
 
+// Another user may write the folder.
+TEST_F(ExceptionHistoryTest, IsNotReadThroughALink) {
+  const std::string other = path_ + ".other";
+  ASSERT_TRUE(write_exceptions(other, {}));
+  std::filesystem::create_symlink(other, path_);
+  EXPECT_EQ(read_exceptions(path_).error().code, ErrorCode::corrupt);
+  std::filesystem::remove(path_);
+  std::filesystem::create_hard_link(other, path_);
+  EXPECT_EQ(read_exceptions(path_).error().code, ErrorCode::corrupt);
+  std::filesystem::remove(other);
+  EXPECT_TRUE(read_exceptions(path_));
+}
+
 TEST_F(ExceptionHistoryTest, RefusesWhatIsSomethingElse) {
   for (const char* const text :
        {"", "{", "[]", "{\"version\":9}", "{\"version\":1,\"exceptions\":[{\"number\":\"x\"}]}",

@@ -96,6 +96,15 @@ TEST_F(LongRun, IsFoundThoughOthersTakeAThirdOfTheProcessorFromIt) {
   }
 }
 
+TEST_F(LongRun, IsThatOfTheThreadThatRunsNotOfTheOneThatWaitsForIt) {
+  for (int i = 0; i < 22; ++i) {
+    threads_.ready[5] += milliseconds(49);
+    const auto taker = looks(1, {{5, 2}, {7, 100}});
+    ASSERT_EQ(taker.has_value(), i == 21);
+  }
+  EXPECT_THAT(threads_.demoted, ElementsAre(7));
+}
+
 TEST_F(LongRun, OfAThreadOnAnotherCoreTakesNothing) {
   EXPECT_FALSE(looks(100, {{elsewhere_, 100}, {7, 50}}));
   EXPECT_THAT(threads_.demoted, IsEmpty());

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "shm/files/memory_rights.hpp"
+#include "tests/support/can_enter.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -86,6 +87,8 @@ TEST_F(CommandServerTest, ServesNoUserOfInstances) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root has instances of another user";
   constexpr uid_t kUser = 64043;
   constexpr uid_t kOther = 64044;
+  const auto folder = std::filesystem::path(path_).parent_path();
+  ASSERT_TRUE(can_enter(folder, kUser)) << "other users may not enter " << folder << ", or a folder above it";
   ASSERT_TRUE(trust_instances_of(kUser));
   const auto connect_as = [this](uid_t user) {
     (void)::syscall(SYS_setresuid, -1, user, -1);

@@ -222,6 +222,8 @@ INSTANTIATE_TEST_SUITE_P(
                     "there is no user \"nobody here\""},
         WrongConfig{"instance_user_root", "[host]\ninstance_user = \"root\"\n", "2",
                     "root has all rights; name another user"},
+        WrongConfig{"user_of_both", "[host]\ninstance_user = \"1\"\n[dds]\nuser = \"1\"\n", "4",
+                    "user: is the user of instances, too"},
         WrongConfig{"user_of_gateway", "[blocks]\nhost_number = 1\n[dds]\nuser = \"nobody\"\n", "2",
                     "host_number: needs an API server with the manager's user"},
         WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},

@@ -16,6 +16,7 @@
 #include "shm/files/lock_file.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/pages/instance_page.hpp"
+#include "tests/support/can_enter.hpp"
 #include "tests/support/in_a_child.hpp"
 #include "tests/support/own_name.hpp"
 
@@ -66,11 +67,13 @@ class InstanceFiles : public testing::Test {
 };
 
 TEST_F(InstanceFiles, LieInAFolderInWhichEachUserHasTheOwnOnes) {
+  const fs::path above = folder_.parent_path();
+  ASSERT_TRUE(can_enter(above, kUser)) << "other users may not enter " << above << ", or a folder above it";
   ASSERT_TRUE(share_with_instances(folder_, kAccount));
-  EXPECT_EQ(rights_of_folder(), fmt::format("0 {} 1771", kUser));
+  EXPECT_EQ(rights_of_folder(), fmt::format("0 {} 1771", ::getegid()));
   const std::string managers = write("manager.lock", 0);
   EXPECT_EQ(in_a_child([&] {
-              const gid_t group = kUser;
+              const gid_t group = kUser;  // beside the manager's, which instances have
               if (::setgroups(1, &group) != 0 || ::setresuid(kUser, kUser, kUser) != 0)
                 return std::string("no user");
               const bool made = std::ofstream(folder_ / "line1.sock").good();
@@ -150,6 +153,15 @@ TEST_F(InstanceFiles, OfAPageOfAnotherUserMakeRoom) {
   EXPECT_TRUE(fs::exists(MemoryFile::path(page))) << "it is the own one";
   hand_over_files(left_, kAccount);
   EXPECT_FALSE(fs::exists(MemoryFile::path(page)));
+}
+
+TEST_F(InstanceFiles, OfTheManagerGetThePlaceOfAFolder) {
+  fs::create_directories(folder_ / "manager.sock" / "inner");
+  put_folder_aside(folder_ / "manager.sock");
+  EXPECT_FALSE(fs::exists(folder_ / "manager.sock"));
+  const std::string file = write("manager.lock", 0);
+  put_folder_aside(file);
+  EXPECT_EQ(look("manager.lock"), "0 0640 text");
 }
 
 TEST_F(InstanceFiles, TellWhichUsersTheyHaveHad) {

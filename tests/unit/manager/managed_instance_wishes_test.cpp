@@ -358,6 +358,8 @@ TEST_F(AdoptedWishes, OfAStopThatHasNotReachedTheProcessAreCarriedOut) {
   EXPECT_TRUE(wishes_.wish->stopping) << "the next manager goes on with it, too";
   ask(ControlVerb::stop);  // the client repeats it
   EXPECT_EQ(host_.requests.size(), 3U) << "two stops and a status";
+  ask(ControlVerb::stop);  // so does another client, and the first one is not forgotten
+  EXPECT_EQ(take_reply().code, ErrorCode::busy);
   answer();
   EXPECT_EQ(take_reply().code, ErrorCode::ok);
   EXPECT_EQ(state(), InstanceState::stopped);

@@ -52,6 +52,15 @@ TEST_F(ServerFiles, OfAVersionBeforeAreGivenToTheGroup) {
   EXPECT_EQ(mode(folder_ / "line1" / "000001.json"), "0660");
 }
 
+TEST_F(ServerFiles, ThatAreKeptAreForNobodyElse) {
+  fs::create_directories(folder_.parent_path());
+  ASSERT_TRUE(keep_folder(folder_));
+  EXPECT_EQ(mode(folder_), "0700");
+  ASSERT_TRUE(share_folder(folder_, GroupRight::writes));
+  ASSERT_TRUE(keep_folder(folder_));
+  EXPECT_EQ(mode(folder_), "0700");
+}
+
 // The server writes there, and the manager is root.
 TEST_F(ServerFiles, AreNoneThatALinkLeadsTo) {
   fs::create_directories(folder_);

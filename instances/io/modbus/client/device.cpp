@@ -101,11 +101,16 @@ LinkResult Device::write_output(Output& output) {
   if (!is_due(output, values)) return {};
   // While the others of a serial line have their turns, or a connection is made, the PLC may have stopped.
   const Link::Turn turn = link_.take_turn();
-  auto result = link_.open(config_);
-  values = MapValues();
-  if (result && !is_due(output, values)) return {};
+  LinkResult result;
+  // A connection at rest may end while it is written to. Then the next one is made, with the values of then.
+  for (bool again = true;; again = false) {
+    result = link_.open(config_);
+    values = MapValues();
+    if (result && !is_due(output, values)) return {};
+    if (result) result = link_.write(config_, *output.map, values);
+    if (result || !again || !result.error().at_rest) break;
+  }
   asked_ = true;
-  if (result) result = link_.write(config_, *output.map, values);
   note(write_shape(*output.map), result);
   output.is_written = result.has_value();
   output.connection = link_.connection();
@@ -177,11 +182,22 @@ void Device::note(ResponseShape shape, const LinkResult& result) {
   }
 }
 
-void Device::publish_inputs() {
+bool Device::is_gone(TimePoint now) const {
+  return config_.when_gone == LossPolicy::zero && state_.is_older(now, config_.gone_after);
+}
+
+// A reading may take so long that its inputs are too old from the beginning: then they are never shown.
+void Device::publish_inputs(TimePoint now) {
+  const bool gone = is_gone(now);
   for (InputImage* const image : input_images_) {
     image->update([&](std::span<std::byte> bytes) {
       for (Input& input : inputs_) {
-        if (input.image == image) input.values.write_to(*input.map, bytes);
+        if (input.image != image) continue;
+        if (gone) {
+          put_zeros(*input.map, bytes);
+        } else {
+          input.values.write_to(*input.map, bytes);
+        }
       }
     });
   }
@@ -198,7 +214,7 @@ void Device::end_poll(const LinkResult& written, const LinkResult& read, TimePoi
   const TimePoint now = MonotonicClock::now();
   if (read) {
     state_.read(asked_at);  // first: inputs that are too old become zero
-    publish_inputs();
+    publish_inputs(now);
   }
   state_.polled(quality_, exception);  // behind the inputs: none is shown as good that has not come
   if (status_image_ != nullptr)
@@ -239,7 +255,7 @@ void Device::make_safe() {
 }
 
 void Device::show(const InputImage& image, std::span<std::byte> bytes, TimePoint now, bool ended) const {
-  if (config_.when_gone == LossPolicy::zero && (ended || state_.is_older(now, config_.gone_after))) {
+  if (ended ? config_.when_gone == LossPolicy::zero : is_gone(now)) {
     for (const Input& input : inputs_) {
       if (input.image == &image) put_zeros(*input.map, bytes);
     }

@@ -69,7 +69,8 @@ class Device {
   [[nodiscard]] LinkResult read_inputs(TimePoint& asked_at);
   [[nodiscard]] LinkResult tell_apart(const RegisterMap& map);
   void note(ResponseShape shape, const LinkResult& result);
-  void publish_inputs();
+  [[nodiscard]] bool is_gone(TimePoint now) const;
+  void publish_inputs(TimePoint now);
   void make_safe();
   void end_poll(const LinkResult& written, const LinkResult& read, TimePoint asked_at);
   void report(const LinkFailure* failure);

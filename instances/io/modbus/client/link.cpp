@@ -26,6 +26,10 @@ LinkFailure not_asked() {
   return {.text = "this process ends", .not_asked = true};
 }
 
+std::unexpected<LinkFailure> without_answer(std::string text) {
+  return std::unexpected(LinkFailure{.text = std::move(text)});
+}
+
 constexpr int kDataBits = 8;  // of RTU
 // A device that answers does so within that time. At the end one that does not must not keep the line.
 constexpr std::chrono::milliseconds kGraceAtEnd{300};
@@ -79,16 +83,18 @@ std::expected<void, std::string> Link::open_tcp(const DeviceConfig& device, Limi
   return {};
 }
 
-std::expected<Pdu, std::string> Link::ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked) {
+std::expected<Pdu, LinkFailure> Link::ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked) {
   // A device may end a connection at rest while it is asked. Then it is asked once more: a request that is
   // carried out twice does no more.
-  for (bool again = static_cast<bool>(tcp_);; again = false) {
-    if (auto opened = open_tcp(device, limits); !opened) return Failure(std::move(opened).error());
+  for (bool again = tcp_ && !limits.once;; again = false) {
+    if (auto opened = open_tcp(device, limits); !opened) return without_answer(std::move(opened).error());
     auto answer =
         exchange_tcp(tcp_.get(), ++number_, device.unit, asked, MonotonicClock::now() + limits.timeout);
     if (answer) return *answer;
     keep(UniqueFd());
-    if (!again || !answer.error().at_rest) return Failure(std::move(answer).error().text);
+    ExchangeFailure& failed = answer.error();
+    if (!again || !failed.at_rest)
+      return std::unexpected(LinkFailure{.text = std::move(failed.text), .at_rest = failed.at_rest});
   }
 }
 
@@ -129,8 +135,8 @@ bool Link::await_line(TimePoint deadline, Limits limits) {
   return true;
 }
 
-std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
-  if (auto opened = open_line(device); !opened) return Failure(std::move(opened).error());
+std::expected<Pdu, LinkFailure> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
+  if (auto opened = open_line(device); !opened) return without_answer(std::move(opened).error());
   modbus_t* const line = line_.get();
   modbus_set_slave(line, device.unit);
   modbus_flush(line);  // a late response of somebody else
@@ -146,11 +152,11 @@ std::expected<Pdu, std::string> Link::ask_line(const DeviceConfig& device, Limit
     // The line stays open for its other devices while they can use it.
     const int error = errno;
     if (error != ETIMEDOUT && error <= MODBUS_ENOBASE) close_line();
-    return Failure(modbus_strerror(error));
+    return without_answer(modbus_strerror(error));
   }
   constexpr int kAround = 3;  // unit and checksum, which libmodbus has compared
   if (size <= kAround || received[0] != device.unit)
-    return Failure(fmt::format("the response is not of unit {}", device.unit));
+    return without_answer(fmt::format("the response is not of unit {}", device.unit));
   Pdu response;
   response.size = static_cast<std::size_t>(size - kAround);
   std::copy_n(received.begin() + 1, response.size, response.bytes.begin());
@@ -161,8 +167,7 @@ LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& a
   const Turn turn = take_turn();
   if (stop_.is_set() && !limits.at_end) return std::unexpected(not_asked());
   const auto response = line_ ? ask_line(device, limits, asked) : ask_tcp(device, limits, asked);
-  auto result = response ? take(response->view())
-                         : std::unexpected(LinkFailure{.exception = 0, .text = response.error()});
+  auto result = response ? take(response->view()) : LinkResult(std::unexpected(response.error()));
   if (!result && result.error().exception == 0) keep(UniqueFd());
   return result;
 }
@@ -171,7 +176,7 @@ LinkResult Link::open(const DeviceConfig& device) {
   const Turn turn = take_turn();
   if (stop_.is_set()) return std::unexpected(not_asked());
   auto opened = line_ ? open_line(device) : open_tcp(device, {.timeout = device.timeout});
-  if (!opened) return std::unexpected(LinkFailure{.exception = 0, .text = std::move(opened).error()});
+  if (!opened) return without_answer(std::move(opened).error());
   return {};
 }
 
@@ -181,7 +186,7 @@ LinkResult Link::read(const DeviceConfig& device, const RegisterMap& map, MapVal
 }
 
 LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {
-  return write(device, map, values, {.timeout = device.timeout});
+  return write(device, map, values, {.timeout = device.timeout, .once = true});
 }
 
 LinkResult Link::write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,

@@ -40,9 +40,10 @@ class Link {
   [[nodiscard]] LinkResult open(const DeviceConfig& device);
   /// The time limit is that of the device, for the connection and for the whole response.
   [[nodiscard]] LinkResult read(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
+  /// It is not repeated after LinkFailure::at_rest, because its values may be old by then.
   [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
-  /// The same with a limit of its own, for a connection that has to be made and for the response. Also after
-  /// the stop.
+  /// The same with a limit of its own, for a connection that has to be made and for the response. Repeated as
+  /// a read is, and possible after the stop.
   [[nodiscard]] LinkResult write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
                                         Duration timeout);
   /// The number of the connection or of the opening of the line. The device may have forgotten earlier
@@ -61,13 +62,14 @@ class Link {
   struct Limits {
     Duration timeout;
     bool at_end = false;
+    bool once = false;  ///< not repeated after a failure at rest
   };
   using Take = std::function<LinkResult(std::span<const std::uint8_t> response)>;
   LinkResult request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take);
   LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
-  std::expected<Pdu, std::string> ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked);
+  std::expected<Pdu, LinkFailure> ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked);
   bool await_line(TimePoint deadline, Limits limits);
-  std::expected<Pdu, std::string> ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked);
+  std::expected<Pdu, LinkFailure> ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked);
   std::expected<void, std::string> open_tcp(const DeviceConfig& device, Limits limits);
   std::expected<void, std::string> open_line(const DeviceConfig& device);
   void close_line() noexcept;

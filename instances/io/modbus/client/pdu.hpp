@@ -19,6 +19,7 @@ struct LinkFailure {
   std::uint8_t exception = 0;  ///< the code of the device; 0: no answer, or garbage
   std::string text;
   bool not_asked = false;  ///< this process ends: nothing was sent, nothing is known of the device
+  bool at_rest = false;    ///< the connection had ended before the response began
 };
 using LinkResult = std::expected<void, LinkFailure>;
 
