@@ -25,7 +25,9 @@ std::string wish_memory_name(std::string_view pool, std::string_view instance) {
 }
 
 // The manager alone writes and reads it.
-const PageRights kWishRights{.owners = is_own_or_roots, .memory = {.mode = 0600}};
+PageRights wish_rights() {
+  return {.owners = is_own_or_roots, .memory = {.mode = 0600}};
+}
 
 // A file that another user has put there in the place of none was never a wish.
 bool is_damaged(const Error& error) noexcept {
@@ -54,7 +56,7 @@ WishMemory::Layout& WishMemory::layout() const noexcept {
 Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view instance) {
   const std::string name = wish_memory_name(pool, instance);
   const auto before =
-      open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_only, kWishRights.owners);
+      open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_only, wish_rights().owners);
   const bool damaged = !before && is_damaged(before.error());
   // For the managers to come: something was written, and none of it is whole.
   const auto mark = [damaged](Layout& page) {
@@ -62,7 +64,7 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
     page.places[0].generation = 1;
     page.places[0].length = std::numeric_limits<std::uint64_t>::max();
   };
-  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything, mark, kWishRights);
+  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything, mark, wish_rights());
   if (!memory && damaged) return failure(ErrorCode::corrupt, memory.error().describe());
   PLCHOST_TRY(memory);
   WishMemory opened(name, *std::move(memory));
@@ -145,8 +147,8 @@ Result<bool> WishMemory::mend() {
   const bool headed = is_described(layout(), kWishKind);
   if (headed && holds(0) && holds(1)) return false;
   if (memory_.lost()) {  // it has been looked at
-    PLCHOST_TRY_ASSIGN(
-        memory_, MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind), kWishRights.memory));
+    PLCHOST_TRY_ASSIGN(memory_, MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind),
+                                                    wish_rights().memory));
   }
   const std::size_t whole = holds(0) ? 0 : 1;
   fill(1 - whole);

@@ -103,7 +103,9 @@ struct PageRights {
   MemoryRights memory = {};
 };
 /// Of a page that the manager alone writes: no instance has it by its user or its group.
-inline const PageRights kManagersPage{.owners = is_own_or_roots, .memory = {.mode = 0640}};
+inline PageRights managers_page() {
+  return {.owners = is_own_or_roots, .memory = {.mode = 0640}};
+}
 
 /// Opens the page of that name, or makes a new one, to write to it. `kind` is a constant of the program.
 template <class Layout, class Begin = void (*)(Layout&)>

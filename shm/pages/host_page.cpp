@@ -91,7 +91,7 @@ Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
   const std::string name = host_page_name(pool);
   PLCHOST_TRY_ASSIGN(auto memory,
                      open_or_make_page<HostPageLayout>(name, kHostPageKind, Replaces::anything,
-                                                       leave_empty<HostPageLayout>, kManagersPage));
+                                                       leave_empty<HostPageLayout>, managers_page()));
   HostPageLayout& page = host_layout_of(memory);  // of a manager that ended while it wrote, perhaps
   page.host.recover();
   for (auto& instance : page.instances) instance.recover();
@@ -135,7 +135,7 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
 bool HostPageWriter::keep() {
   if (!holds(host_layout_of(memory_).host, host_) && memory_.lost()) {
     auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), new_page<HostPageLayout>(kHostPageKind),
-                                     kManagersPage.memory);
+                                     managers_page().memory);
     if (!fresh) return true;
     memory_ = std::move(*fresh);
   }

@@ -38,7 +38,7 @@ LogRing::LogRing(std::string name, LogRingPage page) noexcept
 
 Result<LogRing> LogRing::open(std::string_view pool, std::string_view instance) {
   const std::string name = log_ring_name(pool, instance);
-  PLCHOST_TRY_ASSIGN(auto page, LogRingPage::open(name, kManagersPage));
+  PLCHOST_TRY_ASSIGN(auto page, LogRingPage::open(name, managers_page()));
   return LogRing(name, std::move(page));
 }
 
@@ -48,7 +48,7 @@ void LogRing::remove(std::string_view pool, std::string_view instance) noexcept 
 
 void LogRing::add(const LogEntry& entry) {
   if (page_.lost()) {
-    auto fresh = LogRingPage::renew(name_, kManagersPage);
+    auto fresh = LogRingPage::renew(name_, managers_page());
     if (!fresh) return;
     *this = LogRing(name_, *std::move(fresh));
   }
