@@ -19,6 +19,7 @@
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/memory_rights.hpp"
+#include "shm/files/replace_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
 #include "shm/pages/exception_history.hpp"
@@ -84,15 +85,7 @@ Result<std::string> read_as_owner(const std::string& path, const struct stat& st
 Result<void> write_as(const UserAccount& user, const std::string& path, std::string_view text, mode_t mode) {
   const FilesAsUser rights(user.number, user.group);
   if (!rights.can()) return no_rights_of(user.number);
-  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
-  if (!fd) return failure(ErrorCode::system, "cannot make " + path, errno);
-  while (!text.empty()) {
-    PLCHOST_TRY_ASSIGN(const auto written,
-                       check_errno(::write(fd.get(), text.data(), text.size()), "cannot write " + path));
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  PLCHOST_TRY(check_errno(::fsync(fd.get()), "cannot sync " + path));
-  return {};
+  return write_whole_file(path, text, mode);
 }
 
 // The old one is there until the new one is whole.

@@ -10,9 +10,7 @@
 
 namespace plchost {
 
-namespace {
-
-Result<void> write_all(const std::string& path, std::string_view text, mode_t mode) {
+Result<void> write_whole_file(const std::string& path, std::string_view text, mode_t mode) {
   // A left-over of a run before this one may have other rights.
   if (::unlink(path.c_str()) != 0 && errno != ENOENT)
     return failure(ErrorCode::system, "cannot remove " + path, errno);
@@ -27,8 +25,6 @@ Result<void> write_all(const std::string& path, std::string_view text, mode_t mo
   return {};
 }
 
-}  // namespace
-
 Result<void> sync_directory(const std::string& path) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
@@ -38,7 +34,7 @@ Result<void> sync_directory(const std::string& path) {
 
 Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode) {
   const std::string fresh = path + ".new";
-  if (auto written = write_all(fresh, text, mode); !written) {
+  if (auto written = write_whole_file(fresh, text, mode); !written) {
     ::unlink(fresh.c_str());  // half a file only takes room, of which there may be too little
     return written;
   }

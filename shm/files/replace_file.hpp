@@ -15,6 +15,10 @@ namespace plchost {
 /// Set-up.
 [[nodiscard]] Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode = 0644);
 
+/// Makes the file at `path` with the contents `text`, all of which are on the disk when it returns well. A
+/// left-over of that name is removed. `mode` as above. system: why there is none, or half a one. Set-up.
+[[nodiscard]] Result<void> write_whole_file(const std::string& path, std::string_view text, mode_t mode);
+
 /// Files that were made, renamed or removed in the folder are so for good when it returns, also after a loss
 /// of power. Set-up.
 [[nodiscard]] Result<void> sync_directory(const std::string& path);

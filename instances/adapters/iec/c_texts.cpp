@@ -84,4 +84,26 @@ std::string with_ended_escapes(std::string_view code, std::string_view before) {
   return EscapeReader(code, before).run();
 }
 
+std::size_t find_outside(std::string_view code, std::string_view wanted, std::size_t from) {
+  int depth = 0;
+  char quote = '\0';
+  for (std::size_t i = from; i < code.size(); ++i) {
+    const char c = code[i];
+    if (quote != '\0') {
+      if (c == '\\') ++i;
+      if (c == quote) quote = '\0';
+      continue;
+    }
+    if (depth == 0 && code.substr(i).starts_with(wanted)) return i;
+    if (c == '"' || c == '\'') quote = c;
+    if (c == '(' || c == '[') ++depth;
+    if ((c == ')' || c == ']') && --depth < 0) break;
+  }
+  return std::string_view::npos;
+}
+
+std::size_t find_close(std::string_view code, std::size_t begin) {
+  return find_outside(code, code[begin] == '[' ? "]" : ")", begin + 1);
+}
+
 }  // namespace plchost::iec

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -9,5 +10,10 @@ namespace plchost::iec {
 /// digits behind `\x`: `"\x0A1"` becomes `"\x0A""1"`. A text u"..." has four digits. Lines stay as they are.
 /// Only texts behind `before`, a number and a comma change, if `before` is not empty.
 [[nodiscard]] std::string with_ended_escapes(std::string_view code, std::string_view before = {});
+
+/// Where `wanted` is in C code, outside of parentheses, brackets and quotes; npos: nowhere before they close.
+[[nodiscard]] std::size_t find_outside(std::string_view code, std::string_view wanted, std::size_t from = 0);
+/// Where the parenthesis or the bracket at `begin` closes; npos: nowhere.
+[[nodiscard]] std::size_t find_close(std::string_view code, std::size_t begin);
 
 }  // namespace plchost::iec

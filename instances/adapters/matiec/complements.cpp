@@ -5,29 +5,11 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
+
 namespace plchost::matiec {
 
 namespace {
-
-// Where the parenthesis or the bracket at `begin` closes; npos: nowhere.
-std::size_t find_close(std::string_view code, std::size_t begin) {
-  int depth = 0;
-  char quote = '\0';
-  for (std::size_t i = begin; i < code.size(); ++i) {
-    const char c = code[i];
-    if (quote != '\0') {
-      if (c == '\\') ++i;
-      if (c == quote) quote = '\0';
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else if (c == '(' || c == '[') {
-      ++depth;
-    } else if ((c == ')' || c == ']') && --depth == 0) {
-      return i;
-    }
-  }
-  return std::string_view::npos;
-}
 
 // The first operand in "((A & B) | ~(C))" that has a type; empty: all are numbers without one. iec2c takes
 // no operands of several types.
@@ -37,7 +19,7 @@ std::string_view typed_operand(std::string_view expression) {
     std::size_t end = begin;
     while (end < expression.size() && !kBetween.substr(2).contains(expression[end])) {
       const bool opens = expression[end] == '(' || expression[end] == '[';
-      const std::size_t close = opens ? find_close(expression, end) : end;
+      const std::size_t close = opens ? iec::find_close(expression, end) : end;
       if (close == std::string_view::npos) return {};
       end = close + 1;
     }
@@ -61,7 +43,7 @@ std::string with_narrow_complements(std::string_view code) {
     } else if (c == '"' || c == '\'') {
       quote = c;
     } else if (code.substr(i).starts_with("~(")) {
-      const std::size_t close = find_close(code, i + 1);
+      const std::size_t close = iec::find_close(code, i + 1);
       std::string like(close == std::string_view::npos ? std::string_view()
                                                        : typed_operand(code.substr(i + 1, close - i)));
       std::ranges::replace(like, '\n', ' ');  // the lines of the code stay as they are

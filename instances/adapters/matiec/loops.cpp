@@ -6,31 +6,14 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
+
 namespace plchost::matiec {
 
 namespace {
 
 constexpr std::string_view kFlag = "int __do_increment = 0;";
 constexpr std::string_view kWhile = "while( ";
-
-// Where `wanted` is in C code, outside of parentheses, brackets and quotes; npos: nowhere before they close.
-std::size_t find_outside(std::string_view code, std::string_view wanted, std::size_t from = 0) {
-  int depth = 0;
-  char quote = '\0';
-  for (std::size_t i = from; i < code.size(); ++i) {
-    const char c = code[i];
-    if (quote != '\0') {
-      if (c == '\\') ++i;
-      if (c == quote) quote = '\0';
-      continue;
-    }
-    if (depth == 0 && code.substr(i).starts_with(wanted)) return i;
-    if (c == '"' || c == '\'') quote = c;
-    if (c == '(' || c == '[') ++depth;
-    if ((c == ')' || c == ']') && --depth < 0) break;
-  }
-  return std::string_view::npos;
-}
 
 /// Takes parts off the front of a text.
 class Parts {
@@ -43,7 +26,7 @@ class Parts {
   }
   /// The text up to a word outside of parentheses, which is taken, too.
   std::optional<std::string_view> until(std::string_view word) {
-    const std::size_t at = find_outside(rest_, word);
+    const std::size_t at = iec::find_outside(rest_, word);
     if (at == std::string_view::npos) return std::nullopt;
     const std::string_view part = rest_.substr(0, at);
     rest_.remove_prefix(at + word.size());
@@ -80,7 +63,7 @@ std::string with_first_turns(std::string_view code) {
     const std::size_t begin = code.find_first_not_of(" \n", at + kFlag.size());
     const bool is_loop = begin != std::string_view::npos && code.substr(begin).starts_with(kWhile);
     const std::size_t from = is_loop ? begin + kWhile.size() : at + kFlag.size();
-    const std::size_t end = is_loop ? find_outside(code, " ) {", from) : std::string_view::npos;
+    const std::size_t end = is_loop ? iec::find_outside(code, " ) {", from) : std::string_view::npos;
     const auto first =
         end == std::string_view::npos ? std::nullopt : first_condition(code.substr(from, end - from));
     made += code.substr(0, from);

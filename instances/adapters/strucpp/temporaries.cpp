@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
+
 namespace plchost::strucpp {
 
 namespace {
@@ -19,22 +21,8 @@ std::map<std::string, std::string, std::less<>> initial_values(std::string_view 
   for (begin = begin == std::string_view::npos ? list.size() : begin + 2; begin < list.size();) {
     const std::size_t open = list.find('(', begin);
     if (open == std::string_view::npos) break;
-    std::size_t end = open;
-    char quote = '\0';
-    for (int depth = 0; end < list.size(); ++end) {
-      const char c = list[end];
-      if (quote != '\0') {
-        if (c == '\\') ++end;
-        if (c == quote) quote = '\0';
-      } else if (c == '"' || c == '\'') {
-        quote = c;
-      } else if (c == '(') {
-        ++depth;
-      } else if (c == ')' && --depth == 0) {
-        break;
-      }
-    }
-    if (end >= list.size()) break;
+    const std::size_t end = iec::find_close(list, open);
+    if (end == std::string_view::npos) break;
     values.emplace(list.substr(begin, open - begin), list.substr(open + 1, end - open - 1));
     begin = std::min(list.find_first_not_of(", \n", end + 1), list.size());
   }

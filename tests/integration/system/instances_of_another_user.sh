@@ -25,6 +25,12 @@ start_service() {
   (umask 0027 && { [ "$1" != unlimited ] || ulimit -r 99 -l unlimited; } && exec "${rights[@]}" "$BIN/plchostd" --config "$cell/cell1.toml" 2>>"$cell/cell1.log") &
   managers+=($!)
 }
+# Without a word to the instances, and with the configuration of now.
+next_manager() {
+  kill -KILL "$manager" && wait "$manager" 2>/dev/null || true
+  start_service given
+  manager=${managers[-1]}
+}
 # status PID FIELD: of /proc/PID/status, its words with single spaces
 status() { sed -n "s/^$2:\t*//p" "/proc/$1/status" | tr -s '\t ' ' '; }
 server() { pgrep -f "^$BIN/plchost-dds --host cell1 .*$cell/" || true; }
@@ -173,9 +179,7 @@ products 3
 
 echo "- without the key the next processes are the manager's user, with the files of the other"
 sed -i '/^instance_user = /d' "$cell/cell1.toml"
-kill -KILL "$manager" && wait "$manager" 2>/dev/null || true
-start_service given
-manager=${managers[-1]}
+next_manager
 until_true 60 all_run_as "$user"
 is "$(instance line1 pid)" "$line1" || fail "line1 is another process: it was not adopted"
 post
@@ -202,9 +206,7 @@ products 6
 
 echo "- with the key again they are the other user's, with the files of the manager's"
 sed -i "/^\[host\]/a instance_user = \"$user\"" "$cell/cell1.toml"
-kill -KILL "$manager" && wait "$manager" 2>/dev/null || true
-start_service given
-manager=${managers[-1]}
+next_manager
 until_true 60 all_run_as 0
 kill -KILL "$(instance line1 pid)"
 until_true 60 runs_as line1 "$user"
