@@ -29,6 +29,8 @@ class DebuggingOutputs : public Debugging {
     start(application("steps"), {"--settings", sandbox_.write("line1.cfg", settings)});
     EXPECT_EQ(plc_image_open(sandbox_.pool().c_str(), "io.main", 4, PLC_IMAGE_READ, &main_), 0);
     EXPECT_EQ(plc_image_open(sandbox_.pool().c_str(), "io.edge", 4, PLC_IMAGE_READ, &edge_), 0);
+    // With posts at once, Edge may run twice before the first cycle of Main.
+    EXPECT_TRUE(becomes(main_, PLC_IMAGE_STATE_RUNNING));
     attach();
   }
   ~DebuggingOutputs() override {
@@ -55,7 +57,6 @@ class DebuggingOutputs : public Debugging {
 };
 
 TEST_F(DebuggingOutputs, AreSafeWhileTheirTaskHaltsAndFollowItsCyclesAgain) {
-  ASSERT_TRUE(becomes(main_, PLC_IMAGE_STATE_RUNNING));
   command("break Main:24");
   ASSERT_TRUE(becomes(main_, PLC_IMAGE_STATE_HALTED));
   ASSERT_TRUE(halts("Main"));
