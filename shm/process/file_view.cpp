@@ -46,7 +46,8 @@ Result<void> restrict_files(const FileView& view) {
     return failure(ErrorCode::unavailable, "this kernel has no Landlock, or it is switched off", errno);
   }
   const std::uint64_t truncate = version >= kVersionOfTruncate ? kTruncate : 0;
-  const landlock_ruleset_attr handled{.handled_access_fs = kAll | truncate};
+  landlock_ruleset_attr handled{};  // newer kernels' headers have more members
+  handled.handled_access_fs = kAll | truncate;
   PLCHOST_TRY_ASSIGN(const long made,
                      check_errno(::syscall(SYS_landlock_create_ruleset, &handled, sizeof handled, 0),
                                  "cannot use Landlock"));
