@@ -159,6 +159,8 @@ class TaskSet {
                                                 const std::function<void()>& before = {});
   /// Each has come back from its cycle, or never will.
   [[nodiscard]] bool single_cycle_done() noexcept;
+  /// Tasks that the last stop has kept from their turn in a single cycle. By priority.
+  [[nodiscard]] const std::vector<std::size_t>& left_out() const noexcept { return left_out_; }
   /// "Main, Report"
   [[nodiscard]] std::string names_of(const std::vector<std::size_t>& tasks) const;
   /// Exchanges the scheduler. Running tasks keep their grid, their backlog of events, counters and variables.
@@ -256,6 +258,7 @@ class TaskSet {
   void report(std::size_t index, bool running);
   void begin_second_phase();
   void park_tasks(bool that_drive_outputs);
+  void note_left_out();
   std::vector<std::size_t> busy_in_phase();
   [[nodiscard]] bool runs_code(std::size_t task) const noexcept;
   [[nodiscard]] std::optional<std::vector<std::size_t>> stuck_in_phase(const std::vector<std::size_t>& busy);
@@ -283,6 +286,7 @@ class TaskSet {
   std::vector<std::unique_ptr<Task>> tasks_;
   std::vector<bool> reported_running_;
   std::vector<std::size_t> single_cycle_order_;  // indices of tasks
+  std::vector<std::size_t> left_out_;            // the same
   std::vector<bool> fault_taken_;
   std::optional<Supervision> supervision_;  // until all threads have ended
   TakerSearch takers_{linux_processor_times()};

@@ -110,11 +110,21 @@ std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
   }
   auto stuck = std::move(stop_->stuck);
   stop_.reset();
+  note_left_out();
   retired_.push_back(std::move(active_));
   running_ = false;
   if (stuck.empty() && let_retired_go() && supervision_) supervision_->end();
   look_after_posts();
   return stuck;
+}
+
+void TaskSet::note_left_out() {
+  left_out_.clear();
+  if (!active_->single_cycle) return;
+  for (std::size_t turn = 0; turn < single_cycle_order_.size(); ++turn) {
+    const std::size_t task = single_cycle_order_[turn];
+    if (!active_->single_cycle->has_begun(turn) && !tasks_[task]->fault().raised()) left_out_.push_back(task);
+  }
 }
 
 void TaskSet::park_all() {

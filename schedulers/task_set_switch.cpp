@@ -109,6 +109,8 @@ void TaskSet::start(Prepared prepared) {
     if (looked) (void)tick_by(*active_);
     hand_out_sources();
   }
+  // All, also a task whose thread gets no core for longer than this waits: nobody would look again.
+  for (std::size_t i = 0; i < tasks_.size(); ++i) report(i, true);
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
 }
 

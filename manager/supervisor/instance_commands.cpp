@@ -277,8 +277,16 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
     text = fmt::format("{}: {}; {}", config_.name, done_text(operation_of(request.verb), request.argument),
                        text);
   }
-  finish(reply.code, text);
-  if (reply.code != ErrorCode::ok) look_again();
+  if (reply.code == ErrorCode::ok) return finish(reply.code, text);
+  fail(reply.code, text);
+}
+
+// The state comes before the answer: a client that looks after the answer sees what the command has done.
+void ManagedInstance::fail(ErrorCode code, const std::string& text) {
+  auto failed = std::exchange(operation_, std::nullopt);
+  look_again();
+  operation_ = std::move(failed);
+  finish(code, text);
 }
 
 // A command has failed: the process knows what has become of it.

@@ -82,8 +82,7 @@ bool ManagedInstance::makes_room_for(ControlVerb verb) {
   if (!operation_) return true;
   if (!waits_for_single_cycle() || !contains(kBreakOff, verb)) return false;
   host_.set_timer(std::nullopt);
-  finish(ErrorCode::wrong_state, fmt::format("broken off by '{}'", to_string(verb)));
-  look_again();
+  fail(ErrorCode::wrong_state, fmt::format("broken off by '{}'", to_string(verb)));
   return true;
 }
 

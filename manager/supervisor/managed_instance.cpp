@@ -164,9 +164,8 @@ void ManagedInstance::on_timer() {
       return adoption_timed_out();
     case Phase::up:
       if (operation_ && operation_->step == Step::forwarded) {
-        finish(ErrorCode::timed_out,
-               no_answer_text(takes_over() ? ControlVerb::change_application : operation_->request.verb));
-        look_again();
+        fail(ErrorCode::timed_out,
+             no_answer_text(takes_over() ? ControlVerb::change_application : operation_->request.verb));
       }
       return;
     case Phase::ending:

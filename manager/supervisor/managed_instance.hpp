@@ -243,6 +243,7 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] std::string no_answer_text(ControlVerb verb) const;
   void forward();
   void finish(ErrorCode code, const std::string& text);
+  void fail(ErrorCode code, const std::string& text);
   void look_again();
   void finish_forwarded(const ControlReply& reply);
   [[nodiscard]] Result<void> check_argument(ControlRequest& request) const;

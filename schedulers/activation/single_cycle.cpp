@@ -12,6 +12,7 @@ class SingleCycle::Source final : public ActivationSource {
     Link& link = *round_.links_[link_];
     if (link.gate.wait(round_.clock_) != ActivationGate::Outcome::opened) return std::nullopt;
     ran_ = true;
+    link.begun.store(true, std::memory_order_release);
     return Activation{.release = TimePoint(Duration(link.released_at.load(std::memory_order_relaxed)))};
   }
   void interrupt() noexcept override { round_.links_[link_]->gate.interrupt(round_.clock_); }

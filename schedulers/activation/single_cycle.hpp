@@ -24,12 +24,17 @@ class SingleCycle {
   [[nodiscard]] std::size_t turn() const noexcept { return turn_.load(std::memory_order_acquire); }
   /// Number `link` will not come back; does nothing unless it is its turn. Any thread.
   void skip(std::size_t link) noexcept { came_back(link); }
+  /// Number `link` has begun its cycle. Any thread.
+  [[nodiscard]] bool has_begun(std::size_t link) const noexcept {
+    return links_[link]->begun.load(std::memory_order_acquire);
+  }
 
  private:
   class Source;
   struct Link {
     ActivationGate gate;
     std::atomic<Duration::rep> released_at{0};
+    std::atomic<bool> begun{false};
   };
 
   void release(std::size_t link) noexcept;

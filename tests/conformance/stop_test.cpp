@@ -21,8 +21,11 @@ class Stop : public testing::TestWithParam<std::string_view> {
   struct Holder {
     std::atomic<bool> let_go{false};
     std::atomic<int> inside{0};
+    std::atomic<int> held{0};
     void hold() {
       ++inside;
+      if (let_go) return;
+      ++held;
       while (!let_go) std::this_thread::sleep_for(milliseconds(1));
     }
   };
@@ -187,8 +190,7 @@ TEST_P(Stop, BlamesTheVariableForTasksOfTheFirstPhaseThatItKeepsTheProcessorFrom
   other_.let_go = true;
   start();
   other_.let_go = false;
-  const int before = other_.inside;
-  wait_for([&] { return output_.inside > 0 && other_.inside > before; });
+  wait_for([&] { return output_.inside > 0 && other_.held > 0; });
   ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(1), .others = milliseconds(1)}));
   EXPECT_THAT(finish_stop(), ElementsAre(1));
   EXPECT_EQ(tasks_.set->late_variable(), 1U);
@@ -236,8 +238,7 @@ TEST_P(Stop, WaitsForAnEventVariableThatReturnsInTime) {
   other_.let_go = true;
   start();
   other_.let_go = false;
-  const int before = other_.inside;
-  wait_for([&] { return other_.inside > before; });
+  wait_for([&] { return other_.held > 0; });
   ASSERT_TRUE(tasks_.set->begin_stop({.outputs = seconds(100), .others = seconds(100)}));
   for (int look = 0; look < 50; ++look) {
     ASSERT_FALSE(tasks_.set->advance_stop());
@@ -252,8 +253,7 @@ TEST_P(Stop, WithoutWaitingLeavesAnEventVariableAlone) {
   other_.let_go = true;
   start();
   other_.let_go = false;
-  const int before = other_.inside;
-  wait_for([&] { return other_.inside > before; });
+  wait_for([&] { return other_.held > 0; });
   tasks_.set->park_all();
   EXPECT_FALSE(tasks_.set->running());
   EXPECT_THAT(tasks_.set->still_busy(TimePoint{}), ElementsAre("Edge"));
@@ -289,8 +289,7 @@ TEST_P(EndlessVariable, IsAFaultInASwitch) {
   other_.let_go = true;
   start();
   other_.let_go = false;
-  const int before = other_.inside;
-  wait_for([&] { return other_.inside > before; });
+  wait_for([&] { return other_.held > 0; });
   const auto switched = tasks_.set->switch_to("CmpSchedule", {});
   ASSERT_FALSE(switched);
   EXPECT_EQ(switched.error().code, ErrorCode::timed_out);
@@ -388,6 +387,28 @@ TEST_F(SingleCycleOfTasks, TellsThatItWillRunBeforeTheFirstCycleAndOnlyThen) {
   EXPECT_EQ(tasks_.set->begin_single_cycle({}, before).error().code, ErrorCode::wrong_state);
   EXPECT_EQ(told, 1) << "it was refused";
   ASSERT_TRUE(tasks_.set->stop(seconds(100)));
+}
+
+TEST_F(SingleCycleOfTasks, ThatIsStoppedNamesTheTasksThatHadNoTurn) {
+  using T = Tasks<LinuxClock>;
+  std::atomic<bool> inside{false}, let_go{false};
+  TaskConfig held = T::cyclic("Held", milliseconds(1), [&] {
+    inside = true;
+    while (!let_go) std::this_thread::sleep_for(milliseconds(1));
+  });
+  held.iec_priority = 1;
+  tasks_.add(std::move(held));
+  add(T::cyclic("Last", milliseconds(1), {}), 3);
+  add(T::cyclic("Next", milliseconds(1), {}), 2);
+  ASSERT_TRUE(tasks_.create());
+  ASSERT_TRUE(tasks_.set->begin_single_cycle({}));
+  while (!inside) std::this_thread::sleep_for(milliseconds(1));
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = seconds(100), .others = seconds(100)}));
+  let_go = true;
+  while (!tasks_.set->advance_stop()) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_EQ(tasks_.set->names_of(tasks_.set->left_out()), "Next, Last");
+  run_single_cycle();
+  EXPECT_THAT(tasks_.set->left_out(), IsEmpty());
 }
 
 TEST_F(SingleCycleOfTasks, WithoutSuchATaskIsDoneAtOnce) {

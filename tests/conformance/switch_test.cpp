@@ -1,3 +1,8 @@
+#include <array>
+#include <atomic>
+
+#include <pthread.h>
+
 #include "tests/conformance/scheduler_fixture.hpp"
 
 namespace plchost {
@@ -157,6 +162,53 @@ TEST(SwitchOfRunningTasks, TellsWhichTasksRunAndWhichAreParked) {
   EXPECT_THAT((*set)->still_busy(MonotonicClock::now() + seconds(30)), testing::IsEmpty());
   ASSERT_TRUE((*set)->switch_to("CmpScheduleOneShot", {}));
   ASSERT_TRUE((*set)->stop(seconds(10)));
+  EXPECT_EQ(told, (std::vector<bool>{true, false}));
+}
+
+/// The real clock, by which the thread of task "main" wakes only when `held` is false: others have its core.
+class HeldClock final : public Clock {
+ public:
+  std::atomic<bool> held{false};
+  std::atomic<bool> sleeps{false};
+
+  [[nodiscard]] TimePoint now() const noexcept override { return real_.now(); }
+  void wait(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
+            TimePoint deadline) noexcept override {
+    std::array<char, 16> name{};
+    pthread_getname_np(pthread_self(), name.data(), name.size());
+    const bool is_of_task = std::string_view(name.data()) == "main";
+    if (is_of_task) sleeps = true;
+    real_.wait(word, expected, deadline);
+    while (is_of_task && held) std::this_thread::sleep_for(milliseconds(1));
+  }
+  void wake(const std::atomic<std::uint32_t>& word) noexcept override { real_.wake(word); }
+  void wait(CountedEvent& event, CountedEvent::Snapshot seen) noexcept override { real_.wait(event, seen); }
+  void spin_until(TimePoint deadline) noexcept override { real_.spin_until(deadline); }
+  [[nodiscard]] Result<std::unique_ptr<PeriodicTimer>> make_periodic_timer() override {
+    return real_.make_periodic_timer();
+  }
+
+ private:
+  LinuxClock real_;
+};
+
+TEST(SwitchOfRunningTasks, TellsThatATaskRunsIfItsThreadGetsNoCoreAtTheStart) {
+  HeldClock clock;
+  TaskStatistics statistics{};
+  std::vector<bool> told;
+  TaskEnvironment environment;
+  environment.allow_unprivileged = true;
+  environment.statistics = [&](std::size_t) -> TaskStatistics& { return statistics; };
+  environment.state_changed = [&](std::size_t, bool running) { told.push_back(running); };
+  auto set = TaskSet::create(clock, PriorityBand::low, {ManualTasks::cyclic("main", milliseconds(1), [] {})},
+                             environment);
+  ASSERT_TRUE(set);
+  clock.held = true;
+  while (!clock.sleeps) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_TRUE((*set)->start("CmpScheduleTimer", {}));  // waits for a while
+  clock.held = false;
+  EXPECT_EQ(told, (std::vector<bool>{true}));
+  EXPECT_TRUE((*set)->stop(seconds(10)));
   EXPECT_EQ(told, (std::vector<bool>{true, false}));
 }
 

@@ -112,7 +112,7 @@ class DebugService {
   [[nodiscard]] Result<std::string> write_local(std::string_view order);
   /// Of a task that halts; 0: where it halts.
   [[nodiscard]] Result<const Plc_Frame*> frame_of(std::string_view task, std::string_view number) const;
-  [[nodiscard]] std::string_view state_text(const DebugTask& task) const noexcept;
+  [[nodiscard]] std::string_view state_text(const DebugTask& task, bool halted) const noexcept;
   [[nodiscard]] nlohmann::json state_of_task(std::size_t number, std::size_t frames,
                                              std::size_t with_locals) const;
   [[nodiscard]] std::string remark() const;

@@ -104,9 +104,9 @@ constexpr std::array kDetails{
 
 }  // namespace
 
-std::string_view DebugService::state_text(const DebugTask& task) const noexcept {
+std::string_view DebugService::state_text(const DebugTask& task, bool halted) const noexcept {
   if (suspended_) return "stopped";
-  if (task.halt()) return "halted";
+  if (halted) return "halted";
   if (task.is_to_pause() || task.steps()) return "steps";
   return task.ignored() ? "ignored" : "runs";
 }
@@ -114,8 +114,8 @@ std::string_view DebugService::state_text(const DebugTask& task) const noexcept 
 nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frames,
                                            std::size_t with_locals) const {
   const DebugTask& task = *tasks_[number];
-  const auto halt = task.halt();
-  Json one{{"task", name_of(number)}, {"state", state_text(task)}};
+  const auto halt = task.halt();  // once: it may halt meanwhile, and a state has its place and stack
+  Json one{{"task", name_of(number)}, {"state", state_text(task, halt.has_value())}};
   if (task.halts() > 0) {
     one["halts"] = task.halts();
     const Duration going_on = halt ? time_of(*halt) : Duration();

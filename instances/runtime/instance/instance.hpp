@@ -175,6 +175,7 @@ class Instance {
   void unbind(std::size_t index);
   void begin_stop(std::string_view why);
   [[nodiscard]] Result<std::string> begin_single_cycle();
+  [[nodiscard]] std::string cut_single_cycle() const;
   [[nodiscard]] bool in_transition() const noexcept;
   void finish_transition(const std::vector<std::size_t>& stuck);
   [[nodiscard]] std::string time_out(std::size_t task);

@@ -113,17 +113,27 @@ void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
   if (stuck.empty()) {
     host_->areas().outputs().put_safe(PLC_IMAGE_STATE_STOPPED);
     const bool single = life_.state() == ApplicationState::single_cycle;
-    life_.go_to(ApplicationState::stopped,
-                single ? "each task has run one cycle" : "all tasks are at the end of their cycles");
+    const bool cut = single && !tasks_->left_out().empty();
+    const std::string end = cut      ? cut_single_cycle()
+                            : single ? "each task has run one cycle"
+                                     : "all tasks are at the end of their cycles";
+    life_.go_to(ApplicationState::stopped, end);
     host_->areas().save();
     beat();
-    return answer_waiting(ErrorCode::ok, take_let_go());
+    return cut ? answer_waiting(ErrorCode::timed_out, with_let_go(end))
+               : answer_waiting(ErrorCode::ok, take_let_go());
   }
   std::vector<std::string> late;
   for (const std::size_t task : stuck) late.push_back(time_out(task));
   // Each is an exception of its own; the application's state names them all.
   while (const auto fault = tasks_->take_fault()) (void)keep_fault(*fault);
   enter_exception(fmt::format("stop_timeout: not at the end of its cycle: task {}", fmt::join(late, ", ")));
+}
+
+std::string Instance::cut_single_cycle() const {
+  return fmt::format("the single cycle was over after {} ms (Stop.OthersLimitMs) before the turn of {} {}",
+                     in_ms(start_.settings.stop.others), tasks_->left_out().size() == 1 ? "task" : "tasks",
+                     tasks_->names_of(tasks_->left_out()));
 }
 
 // "Main (after 200 ms)", "Edge (its event variable, after 200 ms)"

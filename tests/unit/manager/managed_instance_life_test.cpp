@@ -33,6 +33,16 @@ class ManagedLife : public ManagedInstanceTest {
   StartKind last_kind() { return host_.spawned.back().start_kind; }
 };
 
+TEST_F(ManagedLife, IsInExceptionBeforeTheStopThatLedToItIsAnswered) {
+  bring_up();
+  std::optional<InstanceState> when_answered;
+  sut().handle({.number = 7, .verb = ControlVerb::stop, .instance = "line1", .argument = "", .options = {}},
+               [&](const ControlReply& /*reply*/) { when_answered = state(); });
+  show(ApplicationState::exception, "stop_timeout");
+  answer(ErrorCode::timed_out, "it is in exception now");
+  EXPECT_EQ(when_answered, InstanceState::exception);
+}
+
 TEST_F(ManagedLife, ShowsAnExceptionAtTheNextLookAndLeavesTheProcessAlone) {
   fall_into_exception();
   EXPECT_EQ(problem(), "task 'Main': division by zero");

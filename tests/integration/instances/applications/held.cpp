@@ -1,6 +1,7 @@
 // Tasks whose cycles can be held, in a loop that sleeps: by external events, or from the first cycle on by a
-// cold start.
+// cold start. PLC_HOLD_MS: for so long at most.
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <ctime>
 
@@ -15,7 +16,11 @@ std::atomic<bool> hold_other{false};
 std::atomic<bool> hold_variable{false};
 
 void wait_while(const std::atomic<bool>& held) {
-  while (held) {
+  if (const Task_Info* const task = held ? plc_current_task() : nullptr; task != nullptr)
+    plc::log("%s is held", static_cast<const char*>(task->stName));
+  static const char* const limit = std::getenv("PLC_HOLD_MS");
+  const auto end = std::chrono::steady_clock::now() + (limit != nullptr ? std::atoi(limit) * 1ms : 24h);
+  while (held && std::chrono::steady_clock::now() < end) {
     const timespec pause{.tv_sec = 0, .tv_nsec = 1'000'000};
     ::nanosleep(&pause, nullptr);
   }
