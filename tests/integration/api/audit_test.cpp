@@ -209,8 +209,7 @@ TEST_F(Audit, AServerThatIsAskedToEndAnswersWhatWasDoneAlsoWhileTheDiskHangs) {
   std::ofstream(flag) << "hangs";
   auto reply = std::async(std::launch::async,
                           [&] { return client->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon()); });
-  while (host_.requests().size() < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // the manager has answered
+  while (host_.answered < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   host_.server().signal(SIGTERM);
   const auto told = reply.get();
   ASSERT_TRUE(told) << told.error().describe();

@@ -196,6 +196,7 @@ void TestHost::serve(PacketListener& listener, const std::stop_token& stop) {
     if (request.verb == ControlVerb::stop) write_instance(0, request.instance, InstanceState::stopped, 4711);
     reply.number = request.number;
     (void)peer->send(encode(reply));
+    if (request.verb != ControlVerb::check_host) ++answered;
   }
 }
 

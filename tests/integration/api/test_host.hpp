@@ -79,10 +79,11 @@ class TestHost {
     const std::lock_guard lock(mutex_);
     return checks_;
   }
-  std::atomic<bool> forwards{false};    ///< the instance's own process answers for the manager
-  std::atomic<bool> silent{false};      ///< the manager answers nothing
-  std::atomic<bool> hold{false};        ///< the manager answers "stop" once this is false again
-  std::atomic<bool> close_peer{false};  ///< the manager hangs up
+  std::atomic<bool> forwards{false};     ///< the instance's own process answers for the manager
+  std::atomic<std::size_t> answered{0};  ///< of requests(), by the manager
+  std::atomic<bool> silent{false};       ///< the manager answers nothing
+  std::atomic<bool> hold{false};         ///< the manager answers "stop" once this is false again
+  std::atomic<bool> close_peer{false};   ///< the manager hangs up
 
  private:
   void serve(PacketListener& listener, const std::stop_token& stop);

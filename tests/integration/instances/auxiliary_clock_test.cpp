@@ -49,11 +49,12 @@ double cycles_per_second(const InstanceProcess& sut) {
   };
   // Just behind a cycle: one that a core delays has not counted the releases that were lost by it.
   const auto measure = [&] {
-    const auto before = count();
-    std::pair now(before, MonotonicClock::now());
+    const auto before = sut.task("Fast")->counters.cycles;
+    std::pair now(count(), MonotonicClock::now());
     EXPECT_TRUE(eventually([&] {
+      const TimePoint asked = MonotonicClock::now();
       now = {count(), MonotonicClock::now()};
-      return now.first != before;
+      return sut.task("Fast")->counters.cycles >= before + 2 && now.second - asked < 10ms;
     }));
     return now;
   };

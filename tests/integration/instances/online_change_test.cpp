@@ -230,7 +230,7 @@ TEST(OnlineChangeOfAnInstance, AHundredTimesLeavesNothingBehindAndCountsEveryCyc
   Online sut;
   ASSERT_TRUE(sut.runs());
   ASSERT_EQ(sut.change(application("online_2")).code, ErrorCode::ok);
-  std::this_thread::sleep_for(50ms);
+  std::this_thread::sleep_for(50ms);  // or the process still holds what the first change needed
   const auto held = sut.held();
   const auto lost = sut.main().lost_cycles;
   double longest = 0;
@@ -241,7 +241,10 @@ TEST(OnlineChangeOfAnInstance, AHundredTimesLeavesNothingBehindAndCountsEveryCyc
     ASSERT_EQ(std::sscanf(changed.text.c_str(), "taken over between two cycles, within %lf us", &held_us), 1);
     longest = std::max(longest, held_us);
   }
-  EXPECT_TRUE(eventually([&] { return sut.held() == held; })) << "but the connections of this test";
+  EXPECT_TRUE(eventually([&] {
+    const auto now = sut.held();
+    return now.first <= held.first && now.second <= held.second;
+  })) << "but the connections of this test";
   ASSERT_TRUE(sut.runs());
   const VersionReport report = sut.report();
   EXPECT_EQ(report.version, 2);

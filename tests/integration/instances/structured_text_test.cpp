@@ -243,7 +243,8 @@ TEST_P(TranslatedText, ThatRetainsVariablesHasThemAfterARestart) {
     return after.fresh > 5 && after.total >= before.total + after.fresh;
   })) << after.total;
   EXPECT_GE(after.of_shift, before.of_shift + after.fresh);
-  EXPECT_EQ(after.total - 100, after.of_shift);
+  // The kill may have come between the two.
+  EXPECT_THAT(after.total - 100 - after.of_shift, ::testing::AnyOf(0, 1));
   sut->end(SIGKILL);
   start(so("counting"), "cold");
   EXPECT_TRUE(eventually([&] {

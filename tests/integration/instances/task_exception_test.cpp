@@ -251,6 +251,7 @@ TEST(TaskException, IsNoneOfAThreadThatTakesTheProcessorWhileNoTaskRuns) {
 TEST(TaskException, IsNoneOfALongCycleThatAStopWaitsFor) {
   Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=600\n[Task.Compute]\nWatchdog.TimeUs=20000000\n");
   sut.process().event("compute").post();
+  ASSERT_TRUE(eventually([&] { return sut.process().event("computes").counted().count() == 1; }));
   EXPECT_EQ(sut.process().ask(ControlVerb::stop).code, ErrorCode::ok);
   EXPECT_EQ(sut.process().task("Compute")->counters.cycles, 1U);
   EXPECT_EQ(sut.process().log().find("took the processor"), std::string::npos) << sut.process().log();

@@ -51,11 +51,15 @@ TEST_F(Variables, OfEachTypeAreRead) {
   EXPECT_EQ(client_->table().symbols().size(), 23);
   EXPECT_EQ(process_->runtime().variables, 23);
   EXPECT_EQ(process_->runtime().forces, 0);
-  const ValueReply reply =
-      client_->ask(client_->elements({"main.FLAG", "Main.real", "Main.lreal", "Main.pause", "Main.text",
-                                      "Grid[1,2]", "Grid[0][0]", "Main.serial"}));
+  const auto elements = client_->elements({"main.FLAG", "Main.real", "Main.lreal", "Main.pause", "Main.text",
+                                           "Grid[1,2]", "Grid[0][0]", "Main.serial"});
+  // An answer that finds no moment between the cycles says so.
+  ValueReply reply;
+  ASSERT_TRUE(eventually([&] {
+    reply = client_->ask(elements);
+    return reply.consistent;
+  }));
   EXPECT_EQ(reply.code, ErrorCode::ok);
-  EXPECT_TRUE(reply.consistent);
   EXPECT_THAT(client_->texts(reply),
               ElementsAre("TRUE", "1.5", "-2.0", "T#1s500ms", "'hello'", "6", "1", "4711"));
   EXPECT_GT(reply.time_monotonic_ns, 0);

@@ -39,6 +39,7 @@ TEST(Manager, StopsNoInstanceWhenItIsKilledAndTheNextOneAdoptsThem) {
   EXPECT_EQ(plant.status("drive1").pid, drive);
   EXPECT_EQ(plant.status("drive1").core, 0);
   EXPECT_EQ(plant.status("drive1").scheduler.view(), "CmpScheduleTimer");
+  EXPECT_TRUE(plant.wait_for_cycles("drive1", 1500));  // a tenth is more than one pause of the process takes
   const TaskCounters after = plant.counters("drive1");
   EXPECT_GE(after.cycles, before.cycles + 50);  // the counters went on
   // A shared machine takes single cycles; a task that waits for a manager loses all of them.

@@ -34,7 +34,14 @@ class HeldPlant {
     plant_.start_manager();
     EXPECT_TRUE(plant_.wait_for("line1", InstanceState::running));
     EXPECT_EQ(post("hold_output"), PostResult::posted);
-    EXPECT_TRUE(plant_.wait_for_cycles("line1", 20));  // of others: Output comes before them
+    EXPECT_TRUE(plant_.eventually([&] { return plant_.cycles_of("line1", "HoldOutput") >= 1; }));
+    // Its last cycle is the one that is held: others go on.
+    EXPECT_TRUE(plant_.eventually([&] {
+      const auto output = plant_.cycles_of("line1", "Output");
+      const auto free = plant_.cycles_of("line1", "Free");
+      return plant_.eventually([&] { return plant_.cycles_of("line1", "Free") > free + 20; }) &&
+             plant_.cycles_of("line1", "Output") == output;
+    }));
   }
   PacketSocket begin_stop() { return plchost::begin_stop(plant_); }
   /// In the first phase the other tasks run on.

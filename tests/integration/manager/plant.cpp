@@ -250,6 +250,21 @@ TaskCounters Plant::counters(const std::string& instance) {
   return sum;
 }
 
+std::uint64_t Plant::cycles_of(const std::string& instance, std::string_view task) {
+  std::uint64_t cycles = 0;
+  (void)within(kWriteTakes, [&] {
+    const auto page = InstancePageReader::open(pool_, instance);
+    for (std::uint32_t i = 0; page && i < page->task_count(); ++i) {
+      const auto found = page->task(i);
+      if (!found || found->identity.name.view() != task) continue;
+      cycles = found->counters.cycles;
+      return true;
+    }
+    return false;
+  });
+  return cycles;
+}
+
 bool Plant::wait_for_cycles(const std::string& instance, std::uint64_t more) {
   const std::uint64_t before = cycles(instance);
   return eventually([&] { return cycles(instance) >= before + more; });

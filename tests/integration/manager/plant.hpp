@@ -66,6 +66,7 @@ class Plant {
   std::uint64_t cycles(const std::string& instance) { return counters(instance).cycles; }
   /// Cycles and lost cycles of all tasks so far.
   TaskCounters counters(const std::string& instance);
+  std::uint64_t cycles_of(const std::string& instance, std::string_view task);
   bool wait_for_cycles(const std::string& instance, std::uint64_t more = 5);
   static bool eventually(const std::function<bool()>& condition);
   static bool within(Duration limit, const std::function<bool()>& condition);

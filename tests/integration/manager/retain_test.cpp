@@ -85,7 +85,7 @@ TEST_F(RetainUnderAManager, IsThereAfterManagerAndProcessWereKilled) {
   ASSERT_TRUE(has_counted("24"));
   plant.kill_manager();
   post(1);
-  ASSERT_TRUE(plant.wait_for_cycles("packer1")) << "it runs on";
+  ASSERT_TRUE(plant.eventually([&] { return plant.cycles_of("packer1", "Product") >= 25; })) << "it runs on";
   const int pid = [&] {
     const auto page = InstancePageReader::open(plant.pool(), "packer1");
     return page && page->runtime() ? page->runtime()->pid : 0;

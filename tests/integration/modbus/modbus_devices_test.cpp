@@ -414,6 +414,7 @@ TEST(ModbusDevices, ADeviceThatEndsAConnectionAtRestIsNotLost) {
   ModbusPeer peer(port, Mode::ends);
   std::string text = device(port);
   text.replace(text.find("poll_ms = 10"), 12, "poll_ms = 50");
+  text.replace(text.find("timeout_ms = 200"), 16, "timeout_ms = 10000");
   const ModbusProgram sut(plant, plant.write(text + "rewrite_ms = 0\n"));
   ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
   peer.with([](modbus_mapping_t& mapping) { mapping.tab_registers[7] = 0; });

@@ -45,6 +45,8 @@ exits() {
 }
 
 echo "- the changes to come"
+registered() { plcctl --host north list events --json | jq -e 'any(.[]; .instance == "line1" and .event == "product" and .registered)' >/dev/null; }
+until_true 20 registered
 differences="north/line1: application: $APPLICATIONS/packer.so -> $cell/packer2.so
 north/line1: scheduler: CmpSchedule -> CmpScheduleTimer
 north/line1: event stop: not registered -> registered

@@ -46,6 +46,7 @@ void setup(plc::Application& app) {
   app.external("Report", 5, "report", report);
   app.external("Crash", 6, "crash", [] { std::thread([] { ::raise(SIGSEGV); }).join(); });
   app.external("Hang", 17, "hang", [] {
+    plc::log("hangs");
     for (;;) ::nanosleep(std::array<timespec, 1>{timespec{.tv_sec = 1, .tv_nsec = 0}}.data(), nullptr);
   });
   app.task("Loop", 18, Freewheeling, loop);

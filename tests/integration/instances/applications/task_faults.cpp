@@ -153,7 +153,10 @@ void setup(plc::Application& app) {
     hog_waits = true;
     loop_in_a_thread(60);
   });
-  app.external("Compute", 4, "compute", [] { spin(1500ms); });
+  app.external("Compute", 4, "compute", [computes = app.open_event("computes")] {
+    (void)computes.post();
+    spin(1500ms);
+  });
   app.external("FarHog", 4, "far_hog", [] {
     hog_goes_away = true;
     loop_in_a_thread(80);
