@@ -1,32 +1,47 @@
 #!/usr/bin/env python3
 """Builds the programs of STruC++'s own suite with both compilers for Structured Text, runs them, and compares the values.
 
-Usage: proof.py PROGRAMS [--cycles N] [--only WORD] [--table FILE] [--without-runner]
-PROGRAMS: the folder of plcctl and plc-instance. The compilers are named by PLCHOST_MATIEC and PLCHOST_STRUCPP, both folders of
-a built source tree. Without them nothing is proven, and the exit code is 77.
+Usage: proof.py PROGRAMS [--only PATTERN] [--cycles N] [--seconds N] [--write FILE]
+PROGRAMS: the folder of plcctl, plchostd and plc-instance. PLCHOST_STRUCPP names the folder of the built compiler, in which the suite
+lies. PLCHOST_MATIEC names that of the other one; without it, its columns are empty. Without the suite nothing is proven, and the
+exit code is 77. --write: the table of all, between its two comments in FILE (instances/compilers.md).
 
-Each source gets a CONFIGURATION of one task of 10 ms. For each one:
-build   plcctl makes an application, which plc-instance checks
-run     plc-instance runs it for a second: no exception, and it ends by SIGTERM
-runner  the values after each cycle are those of STruC++'s own runner, of the variables of programs whose values that shows
-both    the values after each cycle are those of the application of the other compiler, of all variables that both declare
-The exit code is 1 if a program of STruC++ is not built, does not run, or has another value than its runner.
+Each source gets a configuration of one task of 10 ms. For each one, and each compiler:
+build       plcctl makes an application, which plc-instance checks
+runner      the values after each cycle are those of STruC++'s own runner, of the variables of programs whose values that shows
+statements  those of the suite about the source (test_*.st) hold: another application makes them itself (stated.py)
+instance    a host runs both applications: values of its cycles, and statements, are those of step_application
+both        the values after each cycle are those of the application of the other compiler, of all variables that both declare
+The exit code is 1 if something of that is otherwise, and known_differences.py does not name it, or if that names too much.
 """
 
 import argparse
+import itertools
 import os
 import pathlib
 import re
-import signal
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 
-TICK_NS = 10_000_000
+sys.dont_write_bytecode = True  # beside the sources nothing is left
+from instance_of_proof import InstanceOfProof
+from known_differences import OTHER_VALUES, REFUSED_BY_MATIEC, STATED_OTHERWISE, STATEMENTS_REFUSED_BY_MATIEC, WITHOUT_RUNNER
+from stated import TICK_MS, blocks_of, program_of, without_comments
+
+TICK_NS = TICK_MS * 1_000_000
+CYCLES_OF_INSTANCE = 2000  # of those that it may have run when it is looked at
 HERE = pathlib.Path(__file__).resolve().parent
 INTEGERS = ("SINT", "USINT", "INT", "UINT", "DINT", "UDINT", "LINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD")
 NS_OF_A_DAY = 86_400_000_000_000
+COUNTER = "counted.cycles"
+TIMED = re.compile(r"\b(TON|TOF|TP)\b|\bTIME\s*\(", re.I)
+COLUMNS = {"source": "source", "strucpp": "STruC++", "runner": "values as its runner", "strucpp stated": "its suite's statements hold",
+           "strucpp instance": "in an instance", "matiec": "MATIEC", "matiec stated": "statements hold", "matiec instance": "in an instance",
+           "both": "values as by STruC++"}
+BEGIN, END = "<!-- made by tests/compilers/proof.py --write", "<!-- end of the table -->"
 # As instances/plc_variables.h numbers and lays out the types.
 BOOL, STRING, COUNTED_STRING, SIZED_STRING, DAYS_DATE = 1, 20, 25, 26, 27
 PLAIN = {2: "b", 3: "h", 4: "i", 5: "q", 6: "B", 7: "H", 8: "I", 9: "Q", 10: "B", 11: "H", 12: "I", 13: "Q", 14: "f", 15: "d",
@@ -38,8 +53,12 @@ def sources_of(strucpp):
     return found + sorted((strucpp / "examples").glob("*.st"))
 
 
-def without_comments(text):
-    return re.sub(r"\(\*.*?\*\)|//[^\n]*|/\*.*?\*/", " ", text, flags=re.S)
+def configured(text, programs):
+    """With a program that counts its cycles, the last one of the task."""
+    text += "\nPROGRAM CountedCycles\nVAR\n  cycles : DINT;\nEND_VAR\ncycles := cycles + 1;\nEND_PROGRAM\n"
+    instances = "".join(f"    PROGRAM {name} WITH cyclic : {program};\n" for name, program in programs + [("counted", "CountedCycles")])
+    return (f"{text}\nCONFIGURATION proof\n  RESOURCE one ON PLC\n    TASK cyclic (INTERVAL := T#{TICK_MS}ms, PRIORITY := 1);\n"
+            f"{instances}  END_RESOURCE\nEND_CONFIGURATION\n")
 
 
 def with_configuration(text):
@@ -51,11 +70,9 @@ def with_configuration(text):
         names = [name for name, body in blocks if not re.search(r"\bVAR_IN_OUT\b", body, flags=re.I)]
         variables = "".join(f"  block{i} : {name};\n" for i, name in enumerate(names))
         calls = "".join(f"  block{i}();\n" for i in range(len(names)))
-        text += f"\nPROGRAM Caller\nVAR\n  cycles : DINT;\n{variables}END_VAR\n  cycles := cycles + 1;\n{calls}END_PROGRAM\n"
+        text += f"\nPROGRAM Caller\nVAR\n  calls : DINT;\n{variables}END_VAR\ncalls := calls + 1;\n{calls}END_PROGRAM\n"
         programs = ["Caller"]
-    instances = "".join(f"    PROGRAM run{i} WITH cyclic : {name};\n" for i, name in enumerate(programs))
-    return (f"{text}\nCONFIGURATION proof\n  RESOURCE one ON PLC\n    TASK cyclic (INTERVAL := T#10ms, PRIORITY := 1);\n"
-            f"{instances}  END_RESOURCE\nEND_CONFIGURATION\n")
+    return configured(text, [(f"run{i}", name) for i, name in enumerate(programs)])
 
 
 def call(command, folder, given=None, limit=600):
@@ -105,10 +122,15 @@ def values_by_cycle(step, application, cycles):
 
 
 def runner_values(strucpp, source, folder, cycles):
-    """Of STruC++'s runner, after each cycle: {name: its one element}."""
-    made = call(["node", strucpp / "dist/node/cli.js", source.name, "-o", "runner.cpp", "--build", "--cxx-flags", "-O0"], folder)
+    """Of STruC++'s runner, after each cycle: {name: its one element}; or None, and why not."""
+    libraries = folder / "libraries"  # but for those that have functions of the suite once more
+    libraries.mkdir(exist_ok=True)
+    for library in (strucpp / "libs").glob("iec-*"):
+        shutil.copy(library, libraries)
+    made = call(["node", strucpp / "dist/node/cli.js", source.name, "-o", "runner.cpp", "--build", "--cxx-flags", "-O0",
+                 "--no-default-libs", "-L", libraries], folder)
     if made.returncode != 0 or not (folder / "runner").exists():
-        return None
+        return None, "; ".join(line for line in (made.stderr + made.stdout).splitlines() if "rror" in line)[:300]
     said = call([folder / "runner"], folder, given="run 1\nvars\n" * cycles, limit=60).stdout
     result = []
     said = re.sub(r"\x1b\[[0-9;]*m", "", said).replace("Executed ", "\nExecuted ")  # no line ends before it
@@ -117,7 +139,7 @@ def runner_values(strucpp, source, folder, cycles):
             result.append({})
         elif result and (found := re.match(r"(\w+\.\w+) : (\w+) = (.*)$", line)):
             result[-1][found[1].lower()] = [shown(found[3], found[2])]
-    return result
+    return result, ""
 
 
 def shown(text, kind):
@@ -141,120 +163,203 @@ def same(one, other):
     return one == other
 
 
-def compare(mine, others):
-    """(values that are the same, the first difference of each variable)."""
+def compare(mine, others, cycles=None):
+    """(values that are the same, {name: its first difference})."""
     count, different = 0, {}
-    for cycle, (values, expected) in enumerate(zip(mine, others), 1):
-        for name in values.keys() & expected.keys():
+    for cycle, values, expected in zip(cycles or itertools.count(1), mine, others):
+        for name in values.keys() & expected.keys() - {COUNTER}:
             if None in values[name] or None in expected[name]:
                 continue
             if len(values[name]) == len(expected[name]) and all(map(same, values[name], expected[name])):
                 count += len(values[name])
             else:
                 different.setdefault(name, f"{name} is {listed(values[name])}, not {listed(expected[name])} (cycle {cycle})")
-    return count, [different[name] for name in sorted(different)]
+    return count, different
 
 
 def listed(elements):
     return ", ".join(map(str, elements))
 
 
-def told(count, different):
-    more = "" if len(different) <= 3 else f", and {len(different) - 3} more"
-    return f"{count} values" + ("; " + ", ".join(different[:3]) + more if different else "")
+class Source:
+    """One of the suite, built and run. Its row says what was seen, its faults what is not as it must be."""
 
+    def __init__(self, proof, path, folder):
+        self.proof, self.path, self.folder = proof, path, folder
+        self.text = path.read_text(encoding="utf-8")
+        self.name = path.stem
+        self.row, self.faults = {key: "" for key in COLUMNS}, []
+        self.row["source"] = f"`{path.parent.name}/{path.stem}`"
 
-def runs_in_instance(options, application, folder, name):
-    """Why not; empty: it runs."""
-    with subprocess.Popen([options.programs / "plc-instance", "--name", "proof", "--pool", name, "--run-directory", folder,
-                           "--application", application], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as instance:
-        try:
-            said, _ = instance.communicate(timeout=options.seconds)
-            return f"it has ended: {said.strip().splitlines()[-1:]}"
-        except subprocess.TimeoutExpired:
-            instance.send_signal(signal.SIGTERM)
-        said, _ = instance.communicate(timeout=60)
-    for left in pathlib.Path("/dev/shm").glob(f"*{name}*"):
-        left.unlink(missing_ok=True)
-    wrong = [line for line in said.splitlines() if "exception" in line.lower()]
-    return wrong[0] if wrong else "" if instance.returncode == 0 else f"exit code {instance.returncode}"
+    def fault(self, text):
+        self.faults.append(f"{self.path.relative_to(self.proof.strucpp)}: {text}")
+
+    def look(self):
+        source = self.folder / "program.st"
+        source.write_text(with_configuration(self.text), encoding="utf-8")
+        values = {}
+        for compiler in self.proof.compilers:
+            application, why = self.proof.build(source, compiler)
+            self.row[compiler] = "yes" if application else f"no: {self.reason(compiler, why)}"
+            if application:
+                values[compiler] = self.cycles(application, compiler)
+        if values.get("strucpp") and not self.proof.options.without_runner:
+            self.compare_with_runner(values["strucpp"], source)
+        if values.get("strucpp") and values.get("matiec"):
+            cycles = self.proof.options.cycles
+            count, different = compare(values["strucpp"][:cycles], values["matiec"][:cycles])
+            known = OTHER_VALUES.get(self.name, ())
+            for name in different.keys() ^ set(known):
+                self.fault(different.get(name, f"{name} is the same with both compilers by now"))
+            self.row["both"] = f"{count}" + (f"; others: {', '.join(f'`{name}`' for name in known)}" if known else "")
+        self.look_at_statements()
+        return self
+
+    def reason(self, compiler, why):
+        known = REFUSED_BY_MATIEC.get(self.name) if compiler == "matiec" else None
+        if known is None:
+            self.fault(f"not built by {compiler}: {why}")
+        return known or why
+
+    def cycles(self, application, compiler):
+        """Of the stepper, as the instance has them too."""
+        values, why = values_by_cycle(self.proof.step, application, CYCLES_OF_INSTANCE)
+        if values is None:
+            self.fault(f"by {compiler}: {why}")
+            return None
+        if compiler == "matiec" and self.name in REFUSED_BY_MATIEC:
+            self.fault("built by matiec by now")
+        samples, why = self.proof.instance.samples(application, ["*"], self.proof.options.seconds)
+        if samples is None:
+            self.fault(f"in an instance, by {compiler}: {why}")
+            return values
+        seen = {int(sample[COUNTER][0]): sample for sample in samples if 0 < sample[COUNTER][0] <= CYCLES_OF_INSTANCE}
+        if len(seen) < 2:
+            self.fault(f"in an instance, by {compiler}: {len(seen)} cycles were seen")
+        timed = TIMED.search(without_comments(self.text)) is not None
+        count, different = (0, {}) if timed else compare(seen.values(), [values[cycle - 1] for cycle in seen], seen)
+        for text in different.values():
+            self.fault(f"in an instance, by {compiler}: {text}")
+        self.row[f"{compiler} instance"] = "same values" if count else "runs"
+        return values
+
+    def compare_with_runner(self, values, source):
+        runner, why = runner_values(self.proof.strucpp, source, self.folder, self.proof.options.cycles)
+        known = WITHOUT_RUNNER.get(self.name)
+        if (runner is None) != (known is not None):
+            self.fault(f"its runner is not built: {why}" if runner is None else "its runner is built by now")
+        if runner is None:
+            self.row["runner"] = f"no: {known or why}"
+            return
+        count, different = compare(values, runner)
+        self.row["runner"] = str(count)
+        for text in different.values():
+            self.fault(f"other than its runner: {text}")
+
+    def look_at_statements(self):
+        tests = self.path.with_name(f"test_{self.path.name}")
+        if not tests.exists():
+            return
+        blocks = blocks_of(tests.read_text(encoding="utf-8"))
+        source = self.folder / "stated.st"
+        source.write_text(configured(program_of(self.text, blocks), [(f"{block.program}i", block.program) for block in blocks]), encoding="utf-8")
+        for compiler in self.proof.compilers:
+            application, why = self.proof.build(source, compiler)
+            if application is None:
+                known = None if compiler == "strucpp" else STATEMENTS_REFUSED_BY_MATIEC.get(self.name)
+                if known is None and (compiler == "strucpp" or self.name not in REFUSED_BY_MATIEC):
+                    self.fault(f"its statements are not built by {compiler}: {why}")
+                self.row[f"{compiler} stated"] = f"no: {known}" if known else ""
+                continue
+            if compiler == "matiec" and self.name in STATEMENTS_REFUSED_BY_MATIEC:
+                self.fault("its statements are built by matiec by now")
+            held = self.statements(blocks, application, compiler)
+            known = STATED_OTHERWISE.get(self.name, {}).values() if compiler == "matiec" else ()
+            self.row[f"{compiler} stated"] = "; ".join([f"{held} of {sum(len(block.counters) for block in blocks)}", *known])
+
+    def statements(self, blocks, application, compiler):
+        cycles = max(block.cycles for block in blocks)
+        values, why = values_by_cycle(self.proof.step, application, cycles)
+        if values is None:
+            self.fault(f"its statements, by {compiler}: {why}")
+            return 0
+        samples, why = self.proof.instance.samples(application, ["*.held*"], 0.1)
+        if samples is None:
+            self.fault(f"its statements in an instance, by {compiler}: {why}")
+        held, otherwise = 0, set()
+        for block in blocks:
+            for counter, statement in block.counters:
+                holds = values[-1][counter][0] > 0
+                held += holds
+                if not holds:
+                    otherwise.add(block.name)
+                    if compiler == "strucpp" or block.name not in STATED_OTHERWISE.get(self.name, ()):
+                        self.fault(f"by {compiler}, {values[-1][counter][0]}: {statement}")
+                if block.cycles == 1 and samples and (samples[-1][counter][0] > 0) != holds:
+                    self.fault(f"in an instance, by {compiler}, {samples[-1][counter][0]}: {statement}")
+        if compiler == "matiec":
+            for name in set(STATED_OTHERWISE.get(self.name, ())) - otherwise:
+                self.fault(f"holds with matiec by now: {name}")
+        return held
 
 
 class Proof:
-    def __init__(self, options, strucpp, step):
-        self.options, self.strucpp, self.step = options, strucpp, step
-        self.failed = 0
+    def __init__(self, options, compilers, strucpp, step, instance):
+        self.options, self.compilers, self.strucpp, self.step, self.instance = options, compilers, strucpp, step, instance
 
-    def of(self, path, folder):
-        source = folder / "program.st"
-        source.write_text(with_configuration(path.read_text(encoding="utf-8")), encoding="utf-8")
-        row = {"source": str(path.relative_to(self.strucpp))}
-        applications = {}
-        for compiler in ("strucpp", "matiec"):
-            applications[compiler], row[compiler] = build(self.options, source, compiler, folder)
-        row["run"] = self.run(applications, folder)
-        values = {}
-        for compiler, application in applications.items():
-            values[compiler] = None
-            if application is not None:
-                values[compiler], why = values_by_cycle(self.step, application, self.options.cycles)
-                row[compiler] = row[compiler] or why
-        row["runner"], row["both"] = "-", "-"
-        runner = None
-        if values["strucpp"] and not self.options.without_runner:
-            runner = runner_values(self.strucpp, source, folder, self.options.cycles)
-        if runner:
-            count, different = compare(values["strucpp"], runner)
-            row["runner"] = told(count, different)
-            self.failed += len(different) > 0
-        if values["strucpp"] and values["matiec"]:
-            row["both"] = told(*compare(values["strucpp"], values["matiec"]))
-        self.failed += row["strucpp"] != "" or row["run"] != ""
-        return row
+    def build(self, source, compiler):
+        return build(self.options, source, compiler, source.parent)
 
-    def run(self, applications, folder):
-        why = []
-        for compiler, application in applications.items():
-            if application is not None and (wrong := runs_in_instance(self.options, application, folder, f"proof{os.getpid()}")):
-                why.append(f"{compiler}: {wrong}")
-        return "; ".join(why)
+
+def line_of(row):
+    return "| " + " | ".join((row[key] or "-").replace("|", "/") for key in COLUMNS) + " |"
+
+
+def write_table(file, rows):
+    """Rows of sources that were left out this time stay."""
+    text = file.read_text(encoding="utf-8")
+    begin, end = text.index("\n", text.index(BEGIN)) + 1, text.index(END)
+    lines = {line.split(" | ")[0]: line for line in text[begin:end].splitlines() if line.startswith("| `")}
+    lines.update({line.split(" | ")[0]: line for line in map(line_of, rows)})
+    head = "| " + " | ".join(COLUMNS.values()) + " |\n" + "| --- " * len(COLUMNS) + "|\n"
+    file.write_text(text[:begin] + head + "".join(f"{lines[key]}\n" for key in sorted(lines)) + text[end:], encoding="utf-8")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("programs", type=lambda text: pathlib.Path(text).resolve())
     parser.add_argument("--cycles", type=int, default=20)
-    parser.add_argument("--seconds", type=float, default=1.0)
+    parser.add_argument("--seconds", type=float, default=0.5)
     parser.add_argument("--only", default="")
-    parser.add_argument("--table", type=pathlib.Path)
-    parser.add_argument("--without-runner", action="store_true", help="build and run only: it takes half of the time")
+    parser.add_argument("--write", type=pathlib.Path)
+    parser.add_argument("--without-runner", action="store_true")
     options = parser.parse_args()
-    folders = {name: os.environ.get(name, "") for name in ("PLCHOST_MATIEC", "PLCHOST_STRUCPP")}
-    missing = [name for name, folder in folders.items() if not folder]
-    if missing:
-        print(f"nothing is proven: {' and '.join(missing)} must name the folder of a built compiler")
+    strucpp = os.environ.get("PLCHOST_STRUCPP")
+    if not strucpp:
+        print("nothing is proven: PLCHOST_STRUCPP must name the folder of the built compiler, in which its suite lies")
         return 77
-    strucpp = pathlib.Path(folders["PLCHOST_STRUCPP"]).resolve()
+    strucpp = pathlib.Path(strucpp).resolve()
+    compilers = ["strucpp"] + (["matiec"] if os.environ.get("PLCHOST_MATIEC") else [])
+    sources = [path for path in sources_of(strucpp) if re.search(options.only, str(path))]
+    rows, faults = [], []
     with tempfile.TemporaryDirectory(prefix="plchost-proof.") as base:
-        step = pathlib.Path(base) / "step_application"
+        base = pathlib.Path(base)
+        step = base / "step_application"
         subprocess.run(["cc", "-std=gnu2x", "-O1", "-rdynamic", f"-I{HERE.parent.parent / 'instances'}", HERE / "step_application.c", "-ldl", "-o", step], check=True)
-        proof = Proof(options, strucpp, step)
-        table = []
-        for number, path in enumerate(sources_of(strucpp)):
-            if options.only not in str(path):
-                continue
-            folder = pathlib.Path(base) / str(number)
-            folder.mkdir()
-            row = proof.of(path, folder)
-            table.append(row)
-            line = f"| {row['source']} | " + " | ".join((row[key] or "yes").replace("|", "/") for key in ("strucpp", "run", "runner", "matiec", "both")) + " |"
-            print(line, flush=True)
-            if options.table:
-                with options.table.open("a", encoding="utf-8") as file:
-                    file.write(line + "\n")
-    built = {key: sum(row[key] == "" for row in table) for key in ("strucpp", "matiec")}
-    print(f"{len(table)} sources; STruC++ builds {built['strucpp']}, MATIEC {built['matiec']}; {proof.failed} failures")
-    return 1 if proof.failed else 0
+        with InstanceOfProof(options.programs, base) as instance:
+            proof = Proof(options, compilers, strucpp, step, instance)
+            for number, path in enumerate(sources):
+                (folder := base / str(number)).mkdir()
+                source = Source(proof, path, folder).look()
+                shutil.rmtree(folder)
+                rows.append(source.row)
+                faults += source.faults
+                print(line_of(source.row), *source.faults, sep="\n", flush=True)
+    if options.write:
+        write_table(options.write, rows)
+    built = {compiler: sum(row[compiler] == "yes" for row in rows) for compiler in ("strucpp", "matiec")}
+    print(f"{len(rows)} sources; STruC++ builds {built['strucpp']}, MATIEC {built['matiec']}; {len(faults)} faults")
+    return 1 if faults or not rows else 0
 
 
 if __name__ == "__main__":
