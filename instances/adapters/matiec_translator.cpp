@@ -10,6 +10,7 @@
 #include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/complements.hpp"
+#include "instances/adapters/matiec/explained.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/initial_values.hpp"
@@ -128,8 +129,10 @@ class MatiecTranslator : public Translator {
       std::ranges::move(matiec::taken_variables(context_.project, compiler_.library),
                         std::back_inserter(context_.report.problems));
     }
-    std::ranges::move(matiec::problems_of(end->output, *joined_, context_.project, compiler_.library),
-                      std::back_inserter(context_.report.problems));
+    auto problems = matiec::problems_of(end->output, *joined_, context_.project, compiler_.library);
+    if (!end->success())
+      problems = matiec::explained(std::move(problems), context_.sources, context_.project);
+    std::ranges::move(problems, std::back_inserter(context_.report.problems));
     if (context_.good() && end->signal != 0) {
       context_.fail(
           fmt::format("iec2c was ended by SIG{}, and has not said which line it could not translate",

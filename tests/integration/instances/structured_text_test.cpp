@@ -338,6 +338,8 @@ TEST_F(TranslatedByMatiec, ThatIsWrongIsToldInItsOwnWords) {
   text = kTwice;
   text.replace(text.find("PROGRAM Loop"), 12, "PROGRAM P");
   EXPECT_THAT(build(text).output, HasSubstr("'P' is also a name in the library of iec2c"));
+  text = std::string("FUNCTION_BLOCK Motor METHOD Go END_METHOD END_FUNCTION_BLOCK ") + kTwice;
+  EXPECT_THAT(build(text).output, HasSubstr("twice.st:1:22: METHOD: MATIEC knows the second edition"));
 }
 
 TEST_F(TranslatedByStrucpp, ThatStrucppRefusesIsToldInItsOwnWords) {
