@@ -12,6 +12,7 @@
 #include "api/control/application_versions.hpp"
 #include "api/control/exit_codes.hpp"
 #include "manager/config/accounts.hpp"
+#include "manager/server_files.hpp"
 #include "manager/system/service_manager.hpp"
 #include "shm/files/memory_rights.hpp"
 #include "shm/log/log.hpp"
@@ -149,6 +150,7 @@ void ApiServer::spawn() {
   domain_ = config_.host.dds_domain;
   const auto user = user_number(config_.dds.user);
   user_ = !config_.dds.user.empty() && user ? std::optional(*user) : std::nullopt;
+  give_ledger();
   spawned_ = MonotonicClock::now();
   if (name_since_ns_ == 0) name_since_ns_ = unix_time_ns();
   beats_.reset(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
@@ -171,6 +173,12 @@ void ApiServer::spawn() {
     spdlog::error("API server: {}", process.error().describe());
   }
   timer_.set(MonotonicClock::now() + kApiRestartDelayMax);
+}
+
+// Of a user that is none the server says so itself.
+void ApiServer::give_ledger() const {
+  if (!user_) return hand_over_ledger(config_.host.pool, std::nullopt);
+  if (const auto account = find_user(config_.dds.user)) hand_over_ledger(config_.host.pool, *account);
 }
 
 void ApiServer::ended() {

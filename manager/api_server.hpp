@@ -42,6 +42,7 @@ class ApiServer {
 
  private:
   void spawn();
+  void give_ledger() const;
   void ended();
   void on_timer();
   void name_is_taken(TimePoint now);

@@ -181,7 +181,7 @@ Result<void> Manager::set_up() {
   });
   if (!signals) return signals;
   for (const InstanceConfig& instance : config_.instances) {
-    PLCHOST_TRY_ASSIGN(auto ring, TransitionRing::open(host.pool, instance.name));
+    PLCHOST_TRY_ASSIGN(auto ring, open_transitions(instance.name));
     transitions_.emplace(instance.name, std::move(ring));
   }
   make_supervisor();

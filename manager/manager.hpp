@@ -60,6 +60,7 @@ class Manager : private InstanceObserver {
   [[nodiscard]] Result<void> find_instance_user();
   void share_folders();
   void share_with_server();
+  [[nodiscard]] Result<TransitionRing> open_transitions(const std::string& instance) const;
   void prepare_files(const std::string& instance);
   void make_supervisor();
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);

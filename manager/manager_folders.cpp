@@ -67,16 +67,19 @@ Result<void> Manager::find_instance_user() {
   return {};
 }
 
-// Instances that lack something say so themselves; a disk that hangs keeps none from its start.
+// Instances that lack something say so themselves; a disk that hangs keeps none from its start. Those that
+// run on with another user than the next ones still write there.
 void Manager::share_folders() {
   const HostConfig& host = config_.host;
-  const auto shared = share_with_instances(host.run_directory, instance_user_);
+  std::vector<uid_t> users = users_in(host.run_directory, Claims::held);
+  if (instance_user_) users.push_back(instance_user_->number);
+  const auto shared = share_with_instances(host.run_directory, users);
   if (!shared) spdlog::error("[host] run_directory: instances may lack it: {}", shared.error().describe());
-  const auto share = [folder = host.state_directory, user = instance_user_]() -> Result<void> {
+  const auto share = [folder = host.state_directory, users]() -> Result<void> {
     std::error_code error;
-    if (user) std::filesystem::create_directories(folder, error);
-    if (!user && !std::filesystem::exists(folder, error)) return {};
-    return share_with_instances(folder, user);
+    if (!users.empty()) std::filesystem::create_directories(folder, error);
+    if (users.empty() && !std::filesystem::exists(folder, error)) return {};
+    return share_with_instances(folder, users);
   };
   const auto answered = state_disk_.ask<Result<void>>(kStateLimit, "[host] state_directory", share);
   const auto state_shared = and_then(answered, [](const Result<void>& done) { return done; });
@@ -84,8 +87,21 @@ void Manager::share_folders() {
     spdlog::error("instances may lack [host] state_directory: {}", state_shared.error().describe());
 }
 
+// Beside the manager only instances write it.
+Result<TransitionRing> Manager::open_transitions(const std::string& instance) const {
+  auto ring = TransitionRing::open(config_.host.pool, instance);
+  if (!ring) return ring;
+  std::vector<uid_t> users;
+  if (instance_user_) users.push_back(instance_user_->number);
+  const auto shared = TransitionRing::let_write(config_.host.pool, instance, users);
+  if (!shared) spdlog::error("instance {}: {}", instance, shared.error().describe());
+  return ring;
+}
+
 void Manager::prepare_files(const std::string& instance) {
   const HostConfig& host = config_.host;
+  // A damaged one is the manager's to replace.
+  if (auto ring = open_transitions(instance)) transitions_.insert_or_assign(instance, *std::move(ring));
   hand_over_files({.instance = instance, .pool = host.pool, .run_directory = host.run_directory},
                   instance_user_);
   if (!instance_user_) return;

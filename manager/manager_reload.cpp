@@ -36,8 +36,7 @@ void Manager::adopt_removed() {
     const bool configured =
         std::ranges::find(config_.instances, name, &InstanceConfig::name) != config_.instances.end();
     if (configured) continue;
-    if (auto ring = TransitionRing::open(config_.host.pool, name))
-      transitions_.emplace(name, *std::move(ring));
+    if (auto ring = open_transitions(name)) transitions_.emplace(name, *std::move(ring));
     if (supervisor_->adopt_removed(name)) {
       spdlog::warn("instance {}: runs and is not in the configuration any more; it runs until it is stopped",
                    name);
@@ -60,8 +59,8 @@ Result<std::vector<std::string>> Manager::reload() {
   PLCHOST_TRY(supervisor_->check_room(now.instances));
   for (const InstanceConfig& instance : now.instances) {
     if (transitions_.contains(instance.name)) continue;
-    PLCHOST_TRY_ASSIGN(auto ring, in_step(fmt::format("instance '{}'", instance.name),
-                                          TransitionRing::open(config_.host.pool, instance.name)));
+    PLCHOST_TRY_ASSIGN(auto ring,
+                       in_step(fmt::format("instance '{}'", instance.name), open_transitions(instance.name)));
     transitions_.emplace(instance.name, std::move(ring));
   }
   std::vector<std::string> lines;

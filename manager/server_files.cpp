@@ -12,9 +12,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "manager/system/hand_over.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/files/memory_rights.hpp"
+#include "shm/log/log.hpp"
 #include "shm/process/user_account.hpp"
 
 namespace plchost {
@@ -79,6 +82,22 @@ Result<void> share_folder(const std::string& path, GroupRight right, std::option
     PLCHOST_TRY(give_rights(fd.get(), {.group = group, .mode = mode_of(true, right)}, path));
   }
   return share(fd.get(), path, right, 0);
+}
+
+// Only its user reads and writes it: it says which posts have come already.
+void hand_over_ledger(const std::string& pool, const std::optional<UserAccount>& server) {
+  if (::geteuid() != 0) return;
+  const UserAccount user =
+      server.value_or(UserAccount{.number = ::geteuid(), .group = ::getegid(), .groups = {}});
+  const std::string path = MemoryFile::path(fmt::format("{}.posts", pool));
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return;
+  const bool believed = plain_file(path) && (status.st_uid == user.number || status.st_uid == ::geteuid());
+  const auto done = believed ? hand_over(path, user) : take_away(path);
+  if (!done) return spdlog::error("the API server may lack a file: {}", done.error().describe());
+  if (believed) return;
+  spdlog::warn("{} was put there by another user ({}); it is removed and not used", path,
+               describe_rights(status.st_uid, status.st_gid, status.st_mode));
 }
 
 Result<void> keep_folder(const std::string& path) {

@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include "shm/base/result.hpp"
+#include "shm/process/user_account.hpp"
 
 namespace plchost {
 
@@ -18,6 +19,10 @@ enum class GroupRight : bool { reads, writes };
 /// read. `folders_group`: that of the folder itself, which keeps all others of the manager's group out.
 [[nodiscard]] Result<void> share_folder(const std::string& path, GroupRight right,
                                         std::optional<gid_t> folders_group = std::nullopt);
+
+/// Gives the ledger of posts of a pool to the user that the API server is to have; nothing: that of this
+/// process. One that another user has put there is taken away, and logged. For root, while no server runs.
+void hand_over_ledger(const std::string& pool, const std::optional<UserAccount>& server);
 
 /// Takes all rights to a folder from all other users. Makes it if it is not there; the folder above must be.
 [[nodiscard]] Result<void> keep_folder(const std::string& path);

@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
-#include <string_view>
 #include <utility>
 
 #include <fcntl.h>
@@ -14,12 +13,14 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
+#include "manager/system/hand_over.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/access_list.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/memory_rights.hpp"
-#include "shm/files/replace_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
 #include "shm/pages/exception_history.hpp"
@@ -33,16 +34,9 @@ namespace plchost {
 namespace {
 
 constexpr mode_t kModeBits = 07777;
-constexpr mode_t kShared = 01771;  // each removes only the own files; others enter
+constexpr mode_t kOfUsers = 01751;  // beside which users may write: each removes only the own files
+constexpr mode_t kShared = 01771;   // how that is shown, or the group instead of users
 constexpr mode_t kManagersOnly = 0755;
-constexpr std::size_t kLargestLeft = std::size_t{32} << 20;  // a retain file has up to 16 MiB
-
-// Nothing: it is not there, or no plain file of one name.
-std::optional<struct stat> plain_file(const std::string& path) {
-  struct stat status{};
-  const bool plain = ::lstat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode) && status.st_nlink == 1;
-  return plain ? std::optional(status) : std::nullopt;
-}
 
 bool is_there_of_another(const std::string& path, uid_t user) {
   struct stat status{};
@@ -57,49 +51,6 @@ bool is_held(const std::string& path, const struct stat& status) {
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
   return fd && ::fcntl(fd.get(), F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
-}
-
-std::unexpected<Error> no_rights_of(uid_t user) {
-  return failure(ErrorCode::refused, fmt::format("cannot open files as user {}", user));
-}
-
-Result<std::string> read_as_owner(const std::string& path, const struct stat& status) {
-  const FilesAsUser rights(status.st_uid, status.st_gid);
-  if (!rights.can()) return no_rights_of(status.st_uid);
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  struct stat now{};
-  if (!fd || ::fstat(fd.get(), &now) != 0) return failure(ErrorCode::system, "cannot open " + path, errno);
-  const auto size = static_cast<std::size_t>(now.st_size);
-  if (now.st_ino != status.st_ino || size > kLargestLeft)
-    return failure(ErrorCode::corrupt, path + " has changed, or is too large");
-  std::string text(size, '\0');
-  for (std::size_t at = 0; at < size;) {
-    PLCHOST_TRY_ASSIGN(const auto got,
-                       check_errno(::read(fd.get(), text.data() + at, size - at), "cannot read " + path));
-    if (got == 0) return failure(ErrorCode::corrupt, path + " has changed");
-    at += static_cast<std::size_t>(got);
-  }
-  return text;
-}
-
-Result<void> write_as(const UserAccount& user, const std::string& path, std::string_view text, mode_t mode) {
-  const FilesAsUser rights(user.number, user.group);
-  if (!rights.can()) return no_rights_of(user.number);
-  return write_whole_file(path, text, mode);
-}
-
-// The old one is there until the new one is whole.
-Result<void> hand_over(const std::string& path, const UserAccount& user) {
-  const auto before = plain_file(path);
-  if (!before || before->st_uid == user.number) return {};
-  PLCHOST_TRY_ASSIGN(const auto text, read_as_owner(path, *before));
-  const std::string fresh = path + ".new";
-  ::unlink(fresh.c_str());
-  auto written = write_as(user, fresh, text, before->st_mode & 0777U);
-  if (written && ::rename(fresh.c_str(), path.c_str()) != 0)
-    written = failure(ErrorCode::system, "cannot rename " + fresh, errno);
-  if (!written) ::unlink(fresh.c_str());
-  return written;
 }
 
 void hand_over_all(const std::vector<std::string>& paths, const std::string& instance,
@@ -136,32 +87,38 @@ void remove_pages_of_others(const LeftFiles& left, uid_t user) {
 
 }  // namespace
 
-Result<void> share_with_instances(const std::string& folder, const InstanceUser& user) {
+Result<void> share_with_instances(const std::string& folder, std::span<const uid_t> users) {
   const UniqueFd fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   struct stat status{};
   if (!fd || ::fstat(fd.get(), &status) != 0)
     return failure(ErrorCode::system, "cannot open folder " + folder, errno);
-  if (!user) {
+  if (users.empty()) {
     if ((status.st_mode & kModeBits) != kShared || status.st_uid != ::geteuid()) return {};
+    PLCHOST_TRY(let_users(fd.get(), {}, 0, kManagersOnly, folder));
     return give_rights(fd.get(), {.group = ::getegid(), .mode = kManagersOnly}, folder);
   }
-  // The manager's group, which instances have, too. Of a folder with another group systemd changes the owner
-  // of all files at each start.
-  if ((status.st_mode & kModeBits) == kShared && status.st_gid == ::getegid()) return {};
-  // First the mode: files of others in it are out of reach before the group has it.
-  PLCHOST_TRY(
-      check_errno(::fchmod(fd.get(), kShared & ~mode_t{S_IWGRP}), "cannot set the rights of " + folder));
+  // The manager's group enters it. Of a folder with another group systemd changes the owner of all files at
+  // each start.
+  if (status.st_gid != ::getegid()) {
+    // First the mode: files of others in it are out of reach before the group has it.
+    PLCHOST_TRY(check_errno(::fchmod(fd.get(), kOfUsers), "cannot set the rights of " + folder));
+    PLCHOST_TRY(give_rights(fd.get(), {.group = ::getegid(), .mode = kOfUsers}, folder));
+  }
+  const auto done = let_users(fd.get(), users, S_IRWXO, kOfUsers, folder);
+  if (done || done.error().code != ErrorCode::unsupported) return done;
+  spdlog::warn("{}; each user of group {} can make files there", done.error().describe(), ::getegid());
   return give_rights(fd.get(), {.group = ::getegid(), .mode = kShared}, folder);
 }
 
-std::vector<uid_t> users_in(const std::string& run_directory) {
+std::vector<uid_t> users_in(const std::string& run_directory, Claims which) {
   std::vector<uid_t> users;
   std::error_code error;
   for (std::filesystem::directory_iterator at(run_directory, error), end; !error && at != end;
        at.increment(error)) {
     if (at->path().extension() != ".claim") continue;
     const auto status = plain_file(at->path());
-    if (status && !is_own_or_roots(status->st_uid)) users.push_back(status->st_uid);
+    if (!status || is_own_or_roots(status->st_uid)) continue;
+    if (which == Claims::all || is_held(at->path(), *status)) users.push_back(status->st_uid);
   }
   std::ranges::sort(users);
   users.erase(std::ranges::unique(users).begin(), users.end());
@@ -183,7 +140,8 @@ void hand_over_files(const LeftFiles& left, const InstanceUser& user) {
     if (is_there_of_another(path, account.number)) ::unlink(path.c_str());
   }
   hand_over_all({exception_path(left.run_directory, left.instance),
-                 kept_settings_path(left.run_directory, left.instance), stem + ".events"},
+                 kept_settings_path(left.run_directory, left.instance), stem + ".events",
+                 MemoryFile::path(pool_memory_name(left.pool, retain_memory_name(left.instance)))},
                 left.instance, account);
   remove_pages_of_others(left, account.number);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,13 +13,15 @@ namespace plchost {
 /// The user that instances run as; nothing: that of the manager.
 using InstanceUser = std::optional<UserAccount>;
 
-/// Lets that user make files in a folder of the manager, and keeps those of others from him. Without a user
-/// it takes that back. refused, system: the folder stays as it was. Waits for the disk of the folder.
-[[nodiscard]] Result<void> share_with_instances(const std::string& folder, const InstanceUser& user);
+/// Lets these users make files in a folder of the manager, and keeps those of others from them. Without a
+/// user it takes that back. Where the file system has no access lists it lets the manager's group, and logs
+/// that. refused, system: the folder stays as it was. Waits for the disk of the folder.
+[[nodiscard]] Result<void> share_with_instances(const std::string& folder, std::span<const uid_t> users);
 
-/// The users that instances of this run directory have had, by the files that they made there: some may still
-/// run, and what they have left is used.
-[[nodiscard]] std::vector<uid_t> users_in(const std::string& run_directory);
+/// Instances of a run directory: all that it has had, or those whose processes run.
+enum class Claims : bool { all, held };
+/// The other users that they have had, by the files that they made there: the files that they left are used.
+[[nodiscard]] std::vector<uid_t> users_in(const std::string& run_directory, Claims which = Claims::all);
 
 /// Of an instance that is to be started, and runs as another user than its process before.
 struct LeftFiles {
@@ -27,7 +30,7 @@ struct LeftFiles {
   std::string run_directory;
 };
 /// Gives that user what the process before has left: of its files the one to come may replace only its own.
-/// Files with contents keep them, sockets, claims and pages go.
+/// Files with contents and the memory of retain variables keep them; sockets, claims and pages go.
 void hand_over_files(const LeftFiles& left, const InstanceUser& user);
 /// The same of its retain files. Waits for their disk.
 void hand_over_retain_files(const std::string& state_directory, const std::string& instance,

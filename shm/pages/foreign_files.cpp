@@ -49,7 +49,8 @@ bool belongs(const struct stat& status, Owners owners, const MemoryRights& right
   if (!S_ISREG(status.st_mode)) return false;
   if (owners == Owners::api_server && status.st_uid == api_server) return true;
   if (is_own_or_roots(status.st_uid) || status.st_uid == rights.owner) return true;
-  if (owners != Owners::manager && is_trusted_owner(status.st_uid)) return true;
+  const bool instances_have_some = owners == Owners::instances || owners == Owners::writers_of_pool;
+  if (instances_have_some && is_trusted_owner(status.st_uid)) return true;
   // Only a member of a group can give a file to it.
   const bool of_group = status.st_gid == rights.group.value_or(::getegid()) && (rights.mode & S_IWGRP) != 0;
   return owners == Owners::writers_of_pool && (of_group || allows_to_write(rights, status.st_uid));

@@ -1,10 +1,17 @@
 #include "shm/pages/transition_ring.hpp"
 
+#include <cerrno>
 #include <cstddef>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "shm/base/time.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/files/access_list.hpp"
+#include "shm/files/memory_rights.hpp"
 
 namespace plchost {
 
@@ -25,13 +32,28 @@ std::string transition_ring_name(std::string_view pool, std::string_view instanc
 }
 
 Result<TransitionRing> TransitionRing::open(std::string_view pool, std::string_view instance) {
-  PLCHOST_TRY_ASSIGN(
-      auto page, TransitionRingPage::open(transition_ring_name(pool, instance), {.owners = is_own_or_roots}));
+  PLCHOST_TRY_ASSIGN(auto page,
+                     TransitionRingPage::open(transition_ring_name(pool, instance), managers_page()));
   return TransitionRing(std::move(page));
 }
 
 void TransitionRing::remove(std::string_view pool, std::string_view instance) noexcept {
   MemoryFile::remove(transition_ring_name(pool, instance));
+}
+
+Result<void> TransitionRing::let_write(std::string_view pool, std::string_view instance,
+                                       std::span<const uid_t> users) {
+  constexpr mode_t kGroupReads = 0640;
+  constexpr mode_t kGroupWrites = 0660;
+  constexpr mode_t kWrites = 6;
+  const std::string path = MemoryFile::path(transition_ring_name(pool, instance));
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat status{};
+  if (!fd || ::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "cannot open " + path, errno);
+  if (!S_ISREG(status.st_mode) || status.st_uid != ::geteuid() || status.st_nlink != 1) return {};
+  const auto done = let_users(fd.get(), users, kWrites, kGroupReads, path);
+  if (done || done.error().code != ErrorCode::unsupported) return done;
+  return give_rights(fd.get(), {.mode = kGroupWrites}, path);
 }
 
 // Each number has its slot, so two writers never write the same one, unless one of them stands still in here

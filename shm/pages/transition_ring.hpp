@@ -3,9 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include <sys/types.h>
 
 #include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
@@ -50,6 +53,10 @@ class TransitionRing {
   /// Goes on with the ring that is there, or makes one.
   [[nodiscard]] static Result<TransitionRing> open(std::string_view pool, std::string_view instance);
   static void remove(std::string_view pool, std::string_view instance) noexcept;
+  /// Lets instances of these users write it, too, and no others but its owner. Where no access list can say
+  /// that, it lets its group. Of the own ring only: nothing happens to one of another user. Set-up.
+  [[nodiscard]] static Result<void> let_write(std::string_view pool, std::string_view instance,
+                                              std::span<const uid_t> users);
 
   /// Numbers and dates it. Soft threads.
   void add(TransitionSource source, std::uint32_t from, std::uint32_t to, std::int32_t pid,

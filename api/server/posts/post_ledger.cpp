@@ -32,6 +32,11 @@ constexpr PageKind kLedgerKind{.what = "ledger of posts",
 /// A process that was killed takes up to this to end.
 constexpr Duration kLockPatience = std::chrono::seconds(5);
 
+// Instances are in the group of the server, and trusted for pages of their own only.
+PageRights servers_page() {
+  return {.owners = is_own_or_roots, .memory = {.mode = 0600}};
+}
+
 LedgerLayout& layout_of(const MemoryFile& memory) {
   return *reinterpret_cast<LedgerLayout*>(memory.bytes().data());  // made with this layout
 }
@@ -57,7 +62,10 @@ Result<PostLedger> PostLedger::open(const ObjectPool& pool) {
   const std::string name = file_name(pool.name());
   PLCHOST_TRY_ASSIGN(auto memory,
                      in_step("cannot open the ledger of posts",
-                             open_or_make_page<LedgerLayout>(name, kLedgerKind, Replaces::anything)));
+                             open_or_make_page<LedgerLayout>(name, kLedgerKind, Replaces::anything,
+                                                             leave_empty<LedgerLayout>, servers_page())));
+  // A version before has let its group write it.
+  (void)::chmod(MemoryFile::path(name).c_str(), servers_page().memory.mode);
   const LockResult locked = layout_of(memory).mutex.lock(MonotonicClock::now() + kLockPatience);
   if (locked != LockResult::locked && locked != LockResult::owner_died) {
     return failure(ErrorCode::busy, fmt::format("the ledger of posts '{}' is in use by thread {}; end the "

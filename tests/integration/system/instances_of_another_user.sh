@@ -35,6 +35,8 @@ next_manager() {
 status() { sed -n "s/^$2:\t*//p" "/proc/$1/status" | tr -s '\t ' ' '; }
 server() { pgrep -f "^$BIN/plchost-dds --host cell1 .*$cell/" || true; }
 # as_instance COMMAND...: with the rights of an instance
+# as_member COMMAND...: as another user of the manager's group
+as_member() { setpriv --reuid "$server_user" --regid "$group" --clear-groups --no-new-privs --bounding-set=-all --inh-caps=-all "$@"; }
 as_instance() { setpriv --reuid "$user" --regid "$group" --groups "$user" --no-new-privs --bounding-set=-all --inh-caps=-all "$@"; }
 user_is() { is "$(status "$(instance "$1" pid)" Uid)" "$2 $2 $2 $2"; }
 runs_as() { state_is "$1" running && user_is "$1" "$2"; }
@@ -122,7 +124,11 @@ echo "- it cannot touch the manager, the API server, what they keep, and files o
 state=$cell/cell1.state
 for folder in "$cell/cell1" "$state"; do
   is "$(stat -c '%u %g %a' "$folder")" "0 $group 1771" || fail "the rights of $folder: $(ls -ld "$folder")"
+  as_instance sh -c "touch '$folder/made' && rm '$folder/made'" || fail "it makes no file in $folder"
+  ! as_member touch "$folder/planted" 2>/dev/null || fail "each user of the group can make files in $folder"
 done
+as_instance test -w "/dev/shm/$pool-cell1.transitions.line1" || fail "it cannot write its changes of state"
+! as_member test -w "/dev/shm/$pool-cell1.transitions.line1" || fail "each user of the group can write its changes of state"
 touch "$cell/others" && chmod 600 "$cell/others"
 for file in "$state/wishes.cell1" "$state/applications.cell1" "$state/applications.cell1/line3" "$state/applications.cell1/line3/000001.so" \
   "$state/audit.cell1" "$cell/cell1/manager.lock" "$cell/others" "/dev/shm/$pool-cell1.host" "/dev/shm/$pool-cell1.wish.line1" \
@@ -130,7 +136,9 @@ for file in "$state/wishes.cell1" "$state/applications.cell1" "$state/applicatio
   [ -e "$file" ] || fail "there is no $file"
   ! as_instance test -w "$file" || fail "it can write $file: $(ls -ld "$file")"
 done
-for file in "$state/wishes.cell1" "$state/audit.cell1" "/dev/shm/$pool-cell1.wish.line1"; do
+for file in "$state/wishes.cell1" "$state/audit.cell1" "/dev/shm/$pool-cell1.wish.line1" "/dev/shm/$pool-cell1.posts"; do
+  [ -e "$file" ] || fail "there is no $file"
+  ! as_instance test -w "$file" || fail "it can write $file: $(ls -ld "$file")"
   ! as_instance test -r "$file" || fail "it can read $file: $(ls -ld "$file")"
 done
 for name in wishes.cell1 applications.cell1 audit.cell1; do
@@ -177,6 +185,15 @@ is "$(find "$cell/cell1/manager.lock" "$cell/cell1/manager.sock" "/dev/shm/$pool
 rm "$cell/cell1/core$first_core.latency"
 products 3
 
+echo "- changes of state that it has overwritten keep none of them from its start"
+printf overwritten | as_instance dd of="/dev/shm/$pool-cell1.transitions.line1" conv=notrunc status=none
+kill -KILL "$line1"
+is_another() { state_is line1 running && [ "$(instance line1 pid)" != "$line1" ]; }
+until_true 30 is_another
+line1=$(pgrep -f "^$BIN/plc-instance --name line1 .*$cell/")
+plcctl list transitions line1 >/dev/null || fail "no changes of state"
+products 3
+
 echo "- without the key the next processes are the manager's user, with the files of the other"
 sed -i '/^instance_user = /d' "$cell/cell1.toml"
 next_manager
@@ -187,6 +204,7 @@ products 4
 kill -KILL "$line1"
 until_true 60 runs_as line1 0
 products 4
+is "$(stat -c %u "/dev/shm/$pool-cell1.memory.line1.retain")" 0 || fail "its retain variables are the other user's"
 plcctl restart instance line2 >/dev/null || fail "no restart of line2"
 until_true 60 runs_as line2 0
 faulted 1 || fail "its exceptions are lost: $(plcctl show exception line2)"
@@ -211,6 +229,7 @@ until_true 60 all_run_as 0
 kill -KILL "$(instance line1 pid)"
 until_true 60 runs_as line1 "$user"
 products 6
+is "$(stat -c %u "/dev/shm/$pool-cell1.memory.line1.retain")" "$user" || fail "its retain variables are the manager's"
 for name in line2 line3; do plcctl restart instance "$name" >/dev/null || fail "no restart of $name"; done
 until_true 60 all_run_as "$user"
 faulted 2 || fail "its exceptions are lost: $(plcctl show exception line2)"
@@ -219,12 +238,15 @@ until_true 20 faulted 3
 plcctl reset instance line2 || fail "no reset"
 post
 products 7
+plcctl reset instance line1 --cold >/dev/null && plcctl start instance line1 >/dev/null || fail "no cold reset"
+post
+products 1
 kill -TERM "$manager" && wait "$manager" || fail "the manager ended with $?"
 nothing_left
 start_service given
 manager=${managers[-1]}
 until_true 60 runs_as line1 "$user"
-products 7
+products 1
 
 echo "- a user that it cannot become keeps it from starting, and the reason is told"
 kill -TERM "$manager" && wait "$manager" || fail "the manager ended with $?"

@@ -1,8 +1,11 @@
 // Folders and files of instances that have a user of their own.
 #include "manager/supervisor/instance_files.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <sstream>
 #include <string>
 
@@ -15,6 +18,7 @@
 
 #include "shm/files/lock_file.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "tests/support/can_enter.hpp"
 #include "tests/support/in_a_child.hpp"
@@ -62,6 +66,13 @@ class InstanceFiles : public testing::Test {
     EXPECT_EQ(::stat(folder_.c_str(), &status), 0);
     return fmt::format("{} {} {:04o}", status.st_uid, status.st_gid, status.st_mode & 07777U);
   }
+  /// A user of this process's group makes a file in the folder.
+  [[nodiscard]] std::string made_by(uid_t user) const {
+    return in_a_child([&] {
+      if (::setgroups(0, nullptr) != 0 || ::setresuid(user, user, user) != 0) return std::string("no user");
+      return std::string(std::ofstream(folder_ / "planted").good() ? "made it" : "made nothing");
+    });
+  }
   fs::path folder_;
   LeftFiles left_;
 };
@@ -69,7 +80,7 @@ class InstanceFiles : public testing::Test {
 TEST_F(InstanceFiles, LieInAFolderInWhichEachUserHasTheOwnOnes) {
   const fs::path above = folder_.parent_path();
   ASSERT_TRUE(can_enter(above, kUser)) << "other users may not enter " << above << ", or a folder above it";
-  ASSERT_TRUE(share_with_instances(folder_, kAccount));
+  ASSERT_TRUE(share_with_instances(folder_, {&kUser, 1}));
   EXPECT_EQ(rights_of_folder(), fmt::format("0 {} 1771", ::getegid()));
   const std::string managers = write("manager.lock", 0);
   EXPECT_EQ(in_a_child([&] {
@@ -80,13 +91,15 @@ TEST_F(InstanceFiles, LieInAFolderInWhichEachUserHasTheOwnOnes) {
               return fmt::format("{} {}", made, ::unlink(managers.c_str()) == 0);
             }),
             "true false");
-  ASSERT_TRUE(share_with_instances(folder_, std::nullopt));
+  EXPECT_EQ(made_by(kUser + 1), "made nothing") << "it is in the manager's group";
+  ASSERT_TRUE(share_with_instances(folder_, {}));
   EXPECT_EQ(rights_of_folder(), fmt::format("0 {} 0755", ::getegid()));
+  EXPECT_EQ(made_by(kUser), "made nothing");
 }
 
 TEST_F(InstanceFiles, OfTheManagerAloneKeepItsRights) {
   fs::permissions(folder_, fs::perms(0750));
-  ASSERT_TRUE(share_with_instances(folder_, std::nullopt));
+  ASSERT_TRUE(share_with_instances(folder_, {}));
   EXPECT_EQ(rights_of_folder(), fmt::format("0 {} 0750", ::getegid()));
 }
 
@@ -94,7 +107,7 @@ TEST_F(InstanceFiles, WithContentsAreHandedOverBothWays) {
   for (const char* name : {"line1.exception", "line1.settings", "line1.events"}) (void)write(name, 0);
   for (const char* name : {"line1.claim", "line1.sock"}) (void)write(name, 0);
   (void)write("line2.exception", 0);
-  ASSERT_TRUE(share_with_instances(folder_, kAccount));
+  ASSERT_TRUE(share_with_instances(folder_, {&kUser, 1}));
   hand_over_files(left_, kAccount);
   const std::string theirs = fmt::format("{} 0640 text", kUser);
   for (const char* name : {"line1.exception", "line1.settings", "line1.events"})
@@ -108,7 +121,7 @@ TEST_F(InstanceFiles, WithContentsAreHandedOverBothWays) {
 TEST_F(InstanceFiles, OfRetainVariablesAreHandedOver) {
   for (const char* name : {"line1.retain.0", "line1.retain.1", "line1.retain.lock", "line1.retain.0.new"})
     (void)write(name, 0);
-  ASSERT_TRUE(share_with_instances(folder_, kAccount));
+  ASSERT_TRUE(share_with_instances(folder_, {&kUser, 1}));
   hand_over_retain_files(folder_, "line1", kAccount);
   EXPECT_EQ(look("line1.retain.0"), fmt::format("{} 0640 text", kUser));
   EXPECT_EQ(look("line1.retain.1"), fmt::format("{} 0640 text", kUser));
@@ -116,10 +129,32 @@ TEST_F(InstanceFiles, OfRetainVariablesAreHandedOver) {
   EXPECT_EQ(look("line1.retain.0.new"), "");
 }
 
+TEST_F(InstanceFiles, OfRetainVariablesInMemoryAreHandedOverBothWays) {
+  const std::string memory = pool_memory_name(left_.pool, "line1.retain");
+  const fs::path path = MemoryFile::path(memory);
+  constexpr gid_t kPools = 64041;
+  const auto fill = [](std::span<std::byte> bytes) -> Result<void> {
+    std::ranges::fill(bytes, std::byte{7});
+    return {};
+  };
+  ASSERT_TRUE(MemoryFile::create(memory, 64, fill, {.group = kPools, .mode = 0660}));
+  const std::string text(64, '\7');
+  const auto shown = [&](uid_t owner) { return fmt::format("{} 0660 {}", owner, text); };
+  hand_over_files(left_, kAccount);
+  EXPECT_EQ(look(path), shown(kUser));
+  struct stat status{};
+  EXPECT_EQ(::stat(path.c_str(), &status), 0);
+  EXPECT_EQ(status.st_gid, kPools) << "firmware of that group uses it";
+  hand_over_files(left_, std::nullopt);
+  EXPECT_EQ(look(path), shown(0));
+  EXPECT_FALSE(fs::exists(path.string() + ".new"));
+  MemoryFile::remove(memory);
+}
+
 // That user can put links into the folder, and the manager is root.
 TEST_F(InstanceFiles, AreNoneThatALinkLeadsTo) {
   const std::string secret = write("secret", 0, "secret");
-  ASSERT_TRUE(share_with_instances(folder_, kAccount));
+  ASSERT_TRUE(share_with_instances(folder_, {&kUser, 1}));
   fs::create_symlink(secret, folder_ / "line1.exception");
   fs::create_hard_link(secret, folder_ / "line1.events");
   hand_over_files(left_, kAccount);
@@ -170,6 +205,7 @@ TEST_F(InstanceFiles, TellWhichUsersTheyHaveHad) {
   (void)write("line3.claim", 0);
   (void)write("line4.sock", 64044);
   EXPECT_THAT(users_in(folder_), testing::ElementsAre(kUser));
+  EXPECT_THAT(users_in(folder_, Claims::held), testing::IsEmpty()) << "no process has a claim";
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include <fmt/format.h>
@@ -10,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "shm/files/memory_file.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -84,6 +86,31 @@ TEST_F(ServerFiles, OfOtherUsersStayAsTheyAre) {
   ASSERT_EQ(::chown((folder_ / "theirs").c_str(), 65534, 65534), 0);
   ASSERT_TRUE(share_folder(folder_, GroupRight::writes));
   EXPECT_EQ(mode(folder_ / "theirs"), "0400");
+}
+
+// How far each source of posts has come.
+TEST_F(ServerFiles, OfTheLedgerAreGivenToTheUserOfTheServer) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root has a server of another user";
+  constexpr uid_t kServer = 64042;
+  const UserAccount account{.number = kServer, .group = kServer, .groups = {kServer}};
+  const std::string pool = own_name("pool");
+  const fs::path ledger = MemoryFile::path(pool + ".posts");
+  const auto owner_and_text = [&] {
+    struct stat status{};
+    if (::lstat(ledger.c_str(), &status) != 0) return std::string();
+    std::ostringstream text;
+    text << std::ifstream(ledger).rdbuf();
+    return fmt::format("{} {}", status.st_uid, text.str());
+  };
+  write(ledger, fs::perms(0600));
+  hand_over_ledger(pool, account);
+  EXPECT_EQ(owner_and_text(), "64042 text");
+  hand_over_ledger(pool, std::nullopt);
+  EXPECT_EQ(owner_and_text(), "") << "of a user that the server does not have";
+  write(ledger, fs::perms(0600));
+  ASSERT_EQ(::chown(ledger.c_str(), kServer + 1, kServer + 1), 0);
+  hand_over_ledger(pool, account);
+  EXPECT_EQ(owner_and_text(), "") << "an instance may have put it there";
 }
 
 }  // namespace

@@ -158,6 +158,21 @@ TEST_F(ForeignFiles, OfAnApiServerOfThatUserAreItsOwn) {
   EXPECT_THAT(take_away(), SizeIs(2)) << "it has the manager's user";
 }
 
+// Instances are in the group of the server. They have no part in its ledger, nor in what it receives.
+TEST_F(ForeignFiles, OfAnInstancesUserAreNoneOfTheServer) {
+  constexpr uid_t kOfInstances = 64045;
+  ASSERT_TRUE(trust_instances_of(kOfInstances));
+  const auto own = [&](const std::string& name) {
+    plant_file(name);
+    EXPECT_EQ(::chown(MemoryFile::path(name).c_str(), kOfInstances, kOfInstances), 0);
+  };
+  own(pool_.get() + ".posts");
+  own(pool_.get() + ".download.1");
+  own(instance_page_name(pool_.get(), "line1"));
+  EXPECT_THAT(take_away_foreign_files(pool_.get(), {.mode = 0660}, kStranger), SizeIs(2));
+  EXPECT_TRUE(exists(instance_page_name(pool_.get(), "line1")));
+}
+
 TEST_F(ForeignFiles, OfRootsGroupAreGivenToTheManagers) {
   ASSERT_TRUE(HostPageWriter::create(pool_.get()));
   plant_file(pool_.get() + ".posts");

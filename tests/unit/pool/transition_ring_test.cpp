@@ -7,7 +7,12 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <grp.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "shm/files/memory_file.hpp"
+#include "tests/support/in_a_child.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -132,6 +137,32 @@ TEST_F(Transitions, OfAnotherVersionAreToldFromWhatIsNone) {
   ring.magic += 1;
   EXPECT_EQ(TransitionRingReader::open(pool(), "line1").error().message,
             fmt::format("shared memory '{}' is not a ring of transitions", name));
+}
+
+// Each user of the group reads it.
+TEST_F(Transitions, AreWrittenByTheOwnerAndTheUsersOfInstances) {
+  (void)writer();
+  const std::string path = MemoryFile::path(transition_ring_name(pool(), "line1"));
+  const auto mode = [&path] {
+    struct stat status{};
+    EXPECT_EQ(::stat(path.c_str(), &status), 0);
+    return status.st_mode & 07777U;
+  };
+  EXPECT_EQ(mode(), 0640U);
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be other users";
+  const auto writes = [&](uid_t user) {
+    return in_a_child([&] {
+      const bool can = ::setgroups(0, nullptr) == 0 && ::setresuid(user, user, user) == 0;
+      return std::string(can && ::access(path.c_str(), W_OK) == 0 ? "writes" : "does not");
+    });
+  };
+  constexpr uid_t kInstances = 64043;
+  ASSERT_TRUE(TransitionRing::let_write(pool(), "line1", {&kInstances, 1}));
+  EXPECT_EQ(writes(kInstances), "writes");
+  EXPECT_EQ(writes(kInstances + 1), "does not") << "it has the group";
+  ASSERT_TRUE(TransitionRing::let_write(pool(), "line1", {}));
+  EXPECT_EQ(writes(kInstances), "does not");
+  EXPECT_EQ(mode(), 0640U);
 }
 
 }  // namespace
