@@ -17,7 +17,7 @@ namespace plchost {
 
 namespace {
 
-constexpr mode_t kPermissions = 0777;
+constexpr mode_t kKeptBits = 0777;
 constexpr std::size_t kLargestLeft = std::size_t{32} << 20;  // retain variables have up to 16 MiB
 
 Result<std::string> read_as_owner(const std::string& path, const struct stat& status) {
@@ -52,7 +52,7 @@ Result<void> give_group(const UserAccount& user, const std::string& path, const 
   if (!rights.can()) return no_rights_of(user.number);
   PLCHOST_TRY(
       check_errno(::lchown(path.c_str(), kSame, before.st_gid), "cannot give " + path + " to its group"));
-  PLCHOST_TRY(check_errno(::chmod(path.c_str(), before.st_mode & kPermissions),
+  PLCHOST_TRY(check_errno(::chmod(path.c_str(), before.st_mode & kKeptBits),
                           "cannot set the permission bits of " + path));
   return {};
 }
