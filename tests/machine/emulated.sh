@@ -39,7 +39,7 @@ machine_start() {
     -nic "user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:$port-:22" >"$work/qemu" 2>&1 </dev/null &
   machine=$!
   echo "  QEMU with $accelerator, $kernel${kernel_line:+ $kernel_line}"
-  until_true 180 answers
+  until_true 900 answers  # an emulated machine beside busy ones
   tar -C "$packages" -c . | ssh_machine 'mkdir /packages && tar -C /packages -x'
   tar -C "$applications" -c . | ssh_machine 'mkdir /applications && tar -C /applications -x'
 }

@@ -1,22 +1,24 @@
 #!/usr/bin/env bash
 # Stories of the packages on a machine of its own: a bare Debian that boots systemd as process 1.
-#   tests/machine/run.sh [--packages FOLDER] [--container | --rt] [SUITE]
+#   tests/machine/run.sh [--packages FOLDER] [--before FOLDER] [--container | --rt] [SUITE]
 # SUITE: bookworm or trixie; default: the Debian of this machine. FOLDER: the packages for it, from manager/package.sh, which is
-# called without this option. The machine is QEMU with Debian's kernel; --rt: with its real-time kernel and an isolated core;
-# --container: systemd-nspawn, in seconds. The Debian is kept in .build/machine; a story changes nothing in it.
+# called without --packages. --before: the packages of a version before. The way back to them, and the upgrade from them, are then
+# stories, too. The machine is QEMU with Debian's kernel; --rt: with its real-time kernel and an isolated core; --container:
+# systemd-nspawn, in seconds. The Debian is kept in .build/machine; a story changes nothing in it.
 # As root. Exit code 77: no such machine can be made here, and nothing was tested.
 set -euo pipefail
 
-packages=
+packages= before=
 kind=emulated kernel=linux-image-amd64 kernel_line=
 suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
 while [ $# -gt 0 ]; do
   case "$1" in
     --packages) packages=$(realpath -e "${2:?"--packages needs a folder"}") && shift ;;
+    --before) before=$(realpath -e "${2:?"--before needs a folder"}") && shift ;;
     --container) kind=container ;;
     --rt) kernel=linux-image-rt-amd64 kernel_line="isolcpus=1 nohz_full=1 rcu_nocbs=1" ;;
     -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit ;;
-    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages, --container, --rt and --help" >&2; exit 2 ;;
+    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages, --before, --container, --rt and --help" >&2; exit 2 ;;
     *) suite=$1 ;;
   esac
   shift
@@ -37,6 +39,7 @@ trap 'exit 130' INT TERM
 fail() {
   echo "FAILED: $*" >&2
   tail -n 30 "$log" >&2
+  [ ! -s "$work/console" ] || tail -n 5 "$work/console" >&2
   [ -z "$machine" ] || on_machine journalctl -q --no-pager -n 40 -u plchostd >&2 || true
   exit 1
 }
@@ -77,7 +80,10 @@ chroot "$root" sh -c 'apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-ge
   >"$log" 2>&1 || cannot "its packages cannot be installed: $(tail -n 1 "$log")"
 
 mkdir "$applications"
-g++ -std=c++20 -O2 -shared -fPIC -I instances -o "$applications/bottling_line.so" instances/examples/bottling_line/*.cpp
+[ -z "$before" ] || cp -r "$before" "$applications/before"
+build() { g++ -std=c++20 -O2 -shared -fPIC -I instances -o "$applications/$1.so" "${@:2}"; }
+build bottling_line instances/examples/bottling_line/*.cpp
+build outputs tests/integration/instances/applications/outputs.cpp
 cat >"$applications/instances" <<'EOF'
 
 [[instance]]
@@ -91,13 +97,38 @@ name = "line2"
 core = 1
 share_core = true
 application = "/applications/bottling_line.so"
+
+[[instance]]
+name = "valves"
+after = ["line1"]
+core = 1
+share_core = true
+application = "/applications/outputs.so"
+settings = "/applications/valves.cfg"
+EOF
+cat >"$applications/valves.cfg" <<'EOF'
+[SysMem]
+Linux.Area.0.Flags=0x8000
+Linux.Area.0.Address=0
+Linux.Area.0.Size=8
+Linux.Area.0.Device=/var/lib/plchost/valves
+Linux.Area.0.SafeState=0xE5E5E5E5E5E5E5E5
 EOF
 
-has_booted() { on_machine systemctl is-system-running | grep -qE 'running|degraded'; }
+has_booted() { [[ "$(on_machine systemctl is-system-running || true)" =~ running|degraded ]]; }
 machine_start
-until_true 180 has_booted
+until_true 900 has_booted
 
-plcctl() { on_machine plcctl --timeout 20 "$@"; }
+# Again while nobody answers (exit code 3): a machine beside busy ones may stand still for so long.
+plcctl() {
+  local try code
+  for try in 1 2 3 4 5; do
+    code=0
+    on_machine plcctl --timeout 20 "$@" || code=$?
+    [ "$code" -eq 3 ] || break
+  done
+  return "$code"
+}
 files() {
   on_machine find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /var/log -o -path /var/cache \
     -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/lib/systemd -o -path /packages -o -path /applications \) -prune -o -print | sort
@@ -105,7 +136,7 @@ files() {
 manager() { on_machine systemctl show -p MainPID --value plchostd; }
 instances() { plcctl list instances --json | jq -c '[.[] | {name, pid, state}] | sort_by(.name)'; }
 cycles() { plcctl list tasks --json | jq "[.[] | select(.instance == \"line1\")] | map(.$1) | add"; }
-run() { plcctl wait instance line1 line2 --timeout 30 && [ "$(on_machine systemctl is-active plchostd)" = active ]; }
+run() { plcctl wait instance line1 line2 valves --timeout 30 && [ "$(on_machine systemctl is-active plchostd)" = active ]; }
 # ends_no_plc WHAT COMMAND...: another manager, the same processes of the instances, and their cycles go on. Cycles that are lost
 # in the same time without the command do not count. A machine that stands still gets further rounds. An emulated one loses
 # cycles all the time, and is not asked for them.
@@ -141,13 +172,20 @@ until_true 60 sees_host
   fail "$(on_machine systemctl show -p Type -p WatchdogUSec -p NotifyAccess plchostd)"
 [ "$(on_machine python3 -c 'import plchost_client; print(plchost_client.Client(timeout=10).hosts()[0].name)')" = plchost ] || fail "Python sees no host"
 
-story "two instances come by a reload of the service"
+# The registers of a device, which a file plays here.
+registers() { on_machine od -An -N8 -tx1 /var/lib/plchost/valves | tr -d ' '; }
+registers_are() { [ "$(registers)" = "$1" ]; }
+driven=5555555555555555 safe=e5e5e5e5e5e5e5e5
+story "three instances come by a reload of the service"
+on_machine sh -c 'truncate -s 4096 /var/lib/plchost/valves && chgrp plchost /var/lib/plchost/valves && chmod 660 /var/lib/plchost/valves'
 on_machine sh -c 'cat /applications/instances >>/etc/plchost/plchost.toml && systemctl reload plchostd' >"$log" 2>&1 || fail "the reload"
-until_true 60 plcctl start instance line1 line2
+until_true 60 plcctl start instance line1 line2 valves
 run || fail "they do not run"
+until_true 20 registers_are "$driven"
 shown=$(instances)
 
 story "each process has its rights, and nobody else has any"
+owner=$(on_machine id -u plchost-plc)
 # of PROGRAM FIELD: of /proc/PID/status
 of() { on_machine sh -c 'sed -n "s/^$2:[[:space:]]*//p" "/proc/$(pgrep -o -x "$1")/status"' _ "$1" "$2" | tr -s '\t ' ' '; }
 server=$(on_machine id -u plchost-dds)
@@ -155,11 +193,37 @@ group=$(on_machine getent group plchost | cut -d: -f3)
 [ "$(of plchost-dds Uid)" = "$server $server $server $server" ] || fail "the API server has the user $(of plchost-dds Uid)"
 [ "$(of plchost-dds Gid)" = "$group $group $group $group" ] || fail "the API server has the group $(of plchost-dds Gid)"
 [ "$(of plchost-dds CapPrm)" = 0000000000000000 ] || fail "the API server has capabilities: $(of plchost-dds CapPrm)"
-[ "$(of plc-instance CapPrm)" = 0000000000804000 ] || fail "an instance has the capabilities $(of plc-instance CapPrm)"
+[ "$(of plc-instance Uid)" = "$owner $owner $owner $owner" ] || fail "an instance has the user $(of plc-instance Uid)"
+limits=$(on_machine sh -c 'sed -nE "s/^Max (realtime priority|locked memory) +([a-z0-9]+) .*/\2/p" "/proc/$(pgrep -o -x plchostd)/limits"' | paste -sd' ')
+none=0000000000000000 of_real_time=0000000000804000
+expected="$none $none $none $none"
+if [ "$limits" != "unlimited 99" ]; then
+  [ "$kind" = container ] || fail "the limits of the unit do not hold: $limits"
+  echo "  this container cannot raise limits ($limits): instances keep two capabilities instead"
+  expected="$of_real_time $of_real_time $none $none"
+fi
+capabilities=$(for set in CapPrm CapEff CapInh CapAmb; do of plc-instance "$set"; done | paste -sd' ')
+[ "$capabilities" = "$expected" ] || fail "an instance has the capabilities $capabilities"
+threads() { on_machine sh -c 'ps -L -o comm=,cls=,rtprio= -p "$(pgrep -o -x plc-instance)"'; }
+[ "$(threads | awk '$2 == "FF" && $3 > highest { highest = $3 } END { print highest + 0 }')" -ge 52 ] ||
+  fail "an instance has no task in real time: $(threads)"
+[ "$(of plc-instance VmLck | grep -oE '[0-9]+')" -ge 1000 ] || fail "an instance has locked $(of plc-instance VmLck)"
 [ "$(of plc-instance NoNewPrivs)$(of plchost-dds NoNewPrivs)" = 11 ] || fail "they may gain rights"
-on_machine journalctl -q --no-pager -u plchostd | grep -q 'files: those that it needs' || fail "the API server sees all files"
+on_machine sh -c 'journalctl -q --no-pager -u plchostd | grep -q "files: those that it needs"' || fail "the API server sees all files"
 exposure=$(on_machine systemd-analyze security --no-pager plchostd.service | sed -n 's/.*level for plchostd.service: \([0-9.]*\) .*/\1/p')
 [ "$(jq -n "$exposure < 3")" = true ] || fail "systemd-analyze security: $exposure"
+# as USER COMMAND...: with all groups of the user
+as() { on_machine setpriv --reuid "$1" --regid "$1" --init-groups "${@:2}"; }
+for folder in /run/plchost /var/lib/plchost; do
+  as plchost-plc sh -c "touch $folder/made && rm $folder/made" || fail "instances make no file in $folder"
+  ! as plchost-dds touch "$folder/planted" 2>>"$log" || fail "the group of the service can make files in $folder"
+done
+for file in /dev/shm/plchost.transitions.line1 /dev/shm/plchost.host /dev/shm/plchost.log.line1; do
+  ! as plchost-dds test -w "$file" || fail "the API server can write $file"
+done
+for file in /dev/shm/plchost.posts /dev/shm/plchost.host /dev/shm/plchost.log.line1 /var/lib/plchost/wishes.plchost; do
+  ! as plchost-plc test -w "$file" || fail "an instance can write $file"
+done
 for file in /run/plchost/manager.sock /run/plchost/line1.sock /dev/shm/plchost /dev/shm/plchost.instance.line1; do
   ! on_machine setpriv --reuid 65534 --regid 65534 --clear-groups test -r "$file" || fail "everybody can read $file"
   ! on_machine setpriv --reuid 65534 --regid 65534 --clear-groups test -w "$file" || fail "everybody can write $file"
@@ -171,8 +235,35 @@ ends_no_plc "an upgrade" on_machine sh -c 'apt-get -q install -y --reinstall /pa
 ends_no_plc "a kill of the manager" on_machine systemctl kill --kill-who=main -s KILL plchostd
 ends_no_plc "a manager that stands still" on_machine systemctl kill --kill-who=main -s STOP plchostd
 
-story "a stop ends them in order"
+[ "$(registers)" = "$driven" ] || fail "outputs have not been driven all along: $(registers)"
+
+if [ -n "$before" ]; then
+  story "the way back to the packages of a version before, and the upgrade from them, end none of them"
+  user_of() { on_machine sh -c 'stat -c %u "/proc/$1"' _ "$(plcctl list instances --json | jq ".[] | select(.name == \"$1\") | .pid")"; }
+  restart_all() {
+    ends_no_plc "$1" on_machine systemctl restart plchostd
+    for name in line1 line2 valves; do plcctl restart instance "$name" >"$log" 2>&1 || fail "no restart of $name"; done
+    until_true 60 run
+    shown=$(instances)
+    for name in line1 line2 valves; do [ "$(user_of "$name")" = "$2" ] || fail "$1: $name is of user $(user_of "$name")"; done
+  }
+  # A version before may not know the key.
+  on_machine sed -i 's/^instance_user/# &/' /etc/plchost/plchost.toml
+  restart_all "a restart without instance_user" 0
+  ends_no_plc "the packages before" on_machine sh -c 'dpkg -i --force-confold --force-downgrade /applications/before/*.deb'
+  ends_no_plc "an upgrade from them" on_machine sh -c 'dpkg -i --force-confold /packages/*.deb'
+  on_machine sed -i 's/^# instance_user/instance_user/' /etc/plchost/plchost.toml
+  restart_all "a restart with instance_user" "$owner"
+  until_true 20 registers_are "$driven"
+fi
+
+story "a stop ends them in order, with their outputs in the safe state"
+since=$(on_machine date +%s)
 on_machine systemctl stop plchostd
+[ "$(registers)" = "$safe" ] || fail "outputs after a stop: $(registers)"
+order=$(on_machine journalctl -q --no-pager -u plchostd --since "@$since" -o cat |
+  sed -nE 's/.*plchostd: instance (line1|valves): (stopping|offline)$/\1 \2/p' | paste -sd,)
+[ "$order" = "valves stopping,valves offline,line1 stopping,line1 offline" ] || fail "the order of a stop: $order"
 [ "$(on_machine pgrep -c plc-instance)" = 0 ] || fail "instances run on after a stop"
 [ -z "$(on_machine ls /dev/shm)" ] || fail "left in /dev/shm: $(on_machine ls /dev/shm)"
 
