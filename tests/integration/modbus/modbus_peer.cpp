@@ -202,9 +202,11 @@ bool ModbusPeer::answer(int fd, Request& request, int size) {
       std::this_thread::sleep_for(kSlow);
       break;
     case Mode::late:
-      std::swap(held_, request);
-      std::swap(held_size_, size);
-      if (size == 0) return true;
+      held_.push_back({.request = request, .size = size});
+      if (held_.size() <= static_cast<std::size_t>(late_by_)) return true;
+      request = held_.front().request;
+      size = held_.front().size;
+      held_.pop_front();
       break;
     case Mode::ends:
       return modbus_reply(context_, request.data(), size, mapping_) < 0;
@@ -212,7 +214,7 @@ bool ModbusPeer::answer(int fd, Request& request, int size) {
     case Mode::normal:
       break;
   }
-  if (mode_ != Mode::late) held_size_ = 0;
+  if (mode_ != Mode::late) held_.clear();
   const bool replied = modbus_reply(context_, request.data(), size, mapping_) >= 0;
   if (mode_ == Mode::echoes) {
     std::copy_n(mapping_->tab_registers, kRegisters, mapping_->tab_input_registers);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -60,7 +61,7 @@ class ModbusPeer {
     other_write,     ///< confirms writes of another address
     own_exception,   ///< answers with an exception that no standard names
     slow,            ///< normal, kSlow behind each request
-    late,            ///< answers each request with the response to the one before
+    late,            ///< answers each request with the response to an earlier one: answer_late()
     ends,            ///< normal, and ends the connection behind each response
     echoes,          ///< normal, and its input registers follow its holding registers
   };
@@ -75,6 +76,11 @@ class ModbusPeer {
   ModbusPeer& operator=(const ModbusPeer&) = delete;
 
   void set(Mode mode) { mode_ = mode; }
+  /// From now on each request gets the response to the one that came `requests` earlier.
+  void answer_late(int requests) {
+    late_by_ = requests;
+    mode_ = Mode::late;
+  }
   /// Calls `use` while no request is answered.
   void with(const std::function<void(modbus_mapping_t&)>& use);
   [[nodiscard]] int holding(int address);
@@ -98,8 +104,12 @@ class ModbusPeer {
   std::atomic<int> requests_{0};
   std::atomic<bool> ends_{false};
   UniqueFd listener_;
-  Request held_{};  ///< late: the request before
-  int held_size_ = 0;
+  struct Held {
+    Request request;
+    int size;
+  };
+  std::deque<Held> held_;  ///< late: requests that are not answered yet
+  std::atomic<int> late_by_{1};
   int line_ = -1;
   int unit_ = 0;
   std::thread thread_;

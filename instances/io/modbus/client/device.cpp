@@ -19,19 +19,6 @@ constexpr std::chrono::milliseconds kSafeStateTimeout{300};
 // For the connection, and again for the response, of one that did not answer last.
 constexpr std::chrono::milliseconds kLastAttempt{100};
 
-// A read that the device has, or less of one, whose response has another shape.
-std::optional<RegisterMap> other_read(const std::vector<RegisterMap>& reads, const ResponseShape& shape) {
-  constexpr std::uint32_t kOneByte = 8;
-  for (const RegisterMap& map : reads) {
-    if (read_shape(map) != shape) return map;
-  }
-  for (RegisterMap less : reads) {
-    less.count = is_bit(less.kind) ? std::min(less.count, kOneByte) : std::max(less.count - 1, 1U);
-    if (read_shape(less) != shape) return less;
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images, const StopEvent& stop)
@@ -44,8 +31,7 @@ Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images,
   for (const RegisterMap& map : config.writes) {
     outputs_.push_back({.map = &map, .image = images.output(map.image), .written = {}, .written_at = {}});
   }
-  // Of a process before.
-  if (!config.serial.empty() && !config.reads.empty()) unanswered_ = read_shape(config.reads.front());
+  if (!config.serial.empty()) unanswered_ = Unanswered::of_process_before();
 }
 
 void Device::run() {
@@ -157,28 +143,32 @@ LinkResult Device::read_inputs(TimePoint& asked_at) {
   return {};
 }
 
-// Nothing at a serial line says which request a response belongs to. A device that answers one request too
-// late would do so forever, with the values of other registers. So after a failure it is asked for something
-// that cannot be mistaken for the response which may still come.
+// A device that answers one request too late would do so forever, with the values of other registers. So
+// after a failure it is asked for something that cannot be mistaken for a response that may still come.
 LinkResult Device::tell_apart(const RegisterMap& map) {
-  if (!unanswered_ || *unanswered_ != read_shape(map)) return {};
-  const auto other = other_read(config_.reads, *unanswered_);
-  if (!other) return {};
-  MapValues ignored;
-  auto read = link_.read(config_, *other, ignored);
-  note(read_shape(*other), read);
-  if (!read && read.error().exception == 0) return read;
+  while (unanswered_.may_come(read_shape(map))) {
+    const auto other = unanswered_.probe(config_.reads);
+    if (!other) break;
+    MapValues ignored;
+    auto read = link_.read(config_, *other, ignored);
+    note(read_shape(*other), read);
+    if (read || read.error().exception != 0) continue;
+    read.error().text +=
+        fmt::format(", when it was asked for {} from address {} to tell late responses apart", other->count,
+                    other->address);
+    return read;
+  }
   return {};
 }
 
 void Device::note(ResponseShape shape, const LinkResult& result) {
   if (config_.serial.empty()) return;
-  const bool is_lost = !result && result.error().exception == 0;
-  // All exceptions of a function are alike: one says nothing about which request it refuses.
-  if (is_lost || (!result && unanswered_)) {
-    unanswered_ = shape;
-  } else if (result && unanswered_ && *unanswered_ != shape) {
-    unanswered_.reset();
+  if (result) {
+    unanswered_.answered(shape);
+  } else if (result.error().exception != 0) {
+    unanswered_.refused(shape);
+  } else if (!result.error().not_asked) {
+    unanswered_.given_up(shape);
   }
 }
 

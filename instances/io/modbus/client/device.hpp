@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +11,7 @@
 #include "instances/io/modbus/client/device_state.hpp"
 #include "instances/io/modbus/client/link.hpp"
 #include "instances/io/modbus/client/pdu.hpp"
+#include "instances/io/modbus/client/unanswered.hpp"
 #include "instances/io/modbus/config/map_values.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 #include "instances/io/modbus/images/image_table.hpp"
@@ -83,8 +83,7 @@ class Device {
   std::vector<InputImage*> input_images_;  ///< of inputs_, each once
   std::vector<Output> outputs_;
   DeviceState state_;
-  /// At a serial line: the device may still answer a request with that shape, which was given up.
-  std::optional<ResponseShape> unanswered_;
+  Unanswered unanswered_;  ///< at a serial line
   std::atomic<bool> has_ended_{false};
   bool asked_ = false;               ///< the poll has something to ask
   Quality quality_ = Quality::none;  ///< of the last poll
