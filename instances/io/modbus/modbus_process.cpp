@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include "instances/io/modbus/client/device_claim.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
@@ -48,7 +49,10 @@ Result<void> ModbusProcess::add_devices() {
     auto& line = lines_[device.serial.empty() ? "tcp " + device.name : device.serial];
     if (!line) {
       PLCHOST_TRY_ASSIGN(line, Link::make(device, stop_));
+      PLCHOST_TRY(line->claim(device));
     }
+    PLCHOST_TRY_ASSIGN(auto outputs, claim_outputs(device));
+    if (outputs) outputs_.push_back(std::move(outputs));
     devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
   }
   return {};
@@ -76,6 +80,7 @@ Result<void> ModbusProcess::run(int signals) {
     if (signal.revents != 0) break;
     const TimePoint now = MonotonicClock::now();
     for (const auto& device : devices_) device->count();
+    for (const UniqueFd& claim : outputs_) end_looks(claim);
     show(now, false);
     repair(now);
   }

@@ -14,6 +14,7 @@
 #include "instances/io/modbus/threads/stop_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/base/unique_fd.hpp"
 
 namespace plchost::modbus {
 
@@ -21,7 +22,7 @@ namespace plchost::modbus {
 /// age of each device and ends the others.
 class ModbusProcess {
  public:
-  /// Opens all images and the server's port. Set-up.
+  /// Opens all images and the server's port. busy: another process has one of them, or a device. Set-up.
   [[nodiscard]] static Result<std::unique_ptr<ModbusProcess>> create(const ModbusConfig& config);
   ModbusProcess(const ModbusProcess&) = delete;
   ModbusProcess& operator=(const ModbusProcess&) = delete;
@@ -46,6 +47,7 @@ class ModbusProcess {
   StopEvent stop_;
   ImageTable images_;
   std::map<std::string, std::unique_ptr<Link>> lines_;  ///< by the serial device, or "tcp " and a name
+  std::vector<UniqueFd> outputs_;  ///< of devices on TCP, which no other process may write
   std::vector<std::unique_ptr<Device>> devices_;
   std::unique_ptr<Server> server_;
   std::vector<Thread> threads_;

@@ -234,6 +234,63 @@ INSTANTIATE_TEST_SUITE_P(Each, ModbusLateDevice,
                          ::testing::Values(Lateness{1, 2}, Lateness{2, 2}, Lateness{3, 2}, Lateness{4, 2},
                                            Lateness{1, 1}, Lateness{2, 1}, Lateness{3, 1}));
 
+// Two processes at one line would take each other's responses.
+TEST(ModbusLine, ALineHasOneProcess) {
+  Plant plant;
+  Plant other;
+  const SerialLine line;
+  ModbusPeer peer(line, 1);
+  const std::string config = plant.write(serial_device(line, 1, 0));
+  ModbusProgram first(plant, config);
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::good); })) << first.log();
+  std::string text = serial_device(line, 2, 8);
+  const std::string link = other.file("tty");
+  text.replace(text.find(line.path()), line.path().size(), link);
+  std::filesystem::create_symlink(line.path(), link);
+  ModbusProgram second(other, other.write(text));
+  EXPECT_EQ(second.end(), 1);
+  EXPECT_TRUE(
+      second.logged(fmt::format("{}: process {} (plchost-modbus --config {}) uses this line; end that "
+                                "one, or put all devices of the line into one file",
+                                link, first.pid(), config)))
+      << second.log();
+  EXPECT_EQ(first.end(SIGKILL), -SIGKILL);
+  const ModbusProgram third(plant, config, "third.log");
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::good); })) << third.log();
+}
+
+TEST(ModbusLine, ALineThatComesLaterHasOneProcess) {
+  Plant plant;
+  Plant other;
+  const SerialLine line;
+  ModbusPeer peer(line, 1);
+  const std::string link = other.file("tty");
+  std::string text = serial_device(line, 1, 0);
+  text.replace(text.find(line.path()), line.path().size(), link);
+  const ModbusProgram second(other, other.write(text));
+  ASSERT_TRUE(eventually([&] { return quality_is(other, 40, Quality::lost); })) << second.log();
+  ModbusProgram first(plant, plant.write(serial_device(line, 1, 0)));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::good); })) << first.log();
+  std::filesystem::create_symlink(line.path(), link);
+  const auto requests = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > requests + 100; }));
+  EXPECT_TRUE(quality_is(other, 40, Quality::lost));
+  EXPECT_EQ(first.end(SIGTERM), 0);
+  EXPECT_TRUE(eventually([&] { return quality_is(other, 40, Quality::good); })) << second.log();
+}
+
+TEST(ModbusLine, TwoNamesOfOneLineInAFileAreRefused) {
+  Plant plant;
+  const SerialLine line;
+  std::string text = serial_device(line, 2, 8);
+  const std::string link = plant.file("tty");
+  text.replace(text.find(line.path()), line.path().size(), link);
+  std::filesystem::create_symlink(line.path(), link);
+  ModbusProgram sut(plant, plant.write(serial_device(line, 1, 0) + text));
+  EXPECT_EQ(sut.end(), 1);
+  EXPECT_TRUE(sut.logged(link + ": another device of this file has this line by another path")) << sut.log();
+}
+
 TEST(ModbusLine, ALineThatIsNotThereIsTriedAgain) {
   Plant plant;
   const SerialLine line;

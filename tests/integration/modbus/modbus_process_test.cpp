@@ -139,6 +139,59 @@ TEST(ModbusProcess, AFileHasOneProcess) {
   EXPECT_TRUE(follows(plant, peer, 97)) << third.log();
 }
 
+// Without an input image, as any number of files may have it.
+std::string outputs_of(const HeldPort& port, std::string_view address, int unit) {
+  std::string text = device(port, fmt::format("unit = {}", unit));
+  text.erase(text.find("status_image"),
+             std::string_view("status_image = \"t.in\"\nstatus_offset = 56\n").size());
+  text.erase(text.find("[[device.read]]"), text.find("[[device.write]]") - text.find("[[device.read]]"));
+  text.replace(text.find(port.address()), port.address().size(), address);
+  return text;
+}
+
+TEST(ModbusProcess, TheOutputsOfADeviceHaveOneProcess) {
+  Plant plant;
+  Plant other;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const std::string config = plant.write(outputs_of(port, port.address(), 1));
+  ModbusProgram first(plant, config);
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  const std::string mapped = fmt::format("[::ffff:127.0.0.1]:{}", port.number());
+  for (int round = 0; round < 12; ++round) {
+    ModbusProgram second(other, other.write(outputs_of(port, mapped, 1)), fmt::format("{}.log", round));
+    ASSERT_EQ(second.end(), 1);
+    ASSERT_THAT(second.log(),
+                HasSubstr(fmt::format("device 'valves': process {} (plchost-modbus --config {}) writes the "
+                                      "outputs of {} unit 1; end that one, or put all maps of the device "
+                                      "into one file",
+                                      first.pid(), config, port.address())))
+        << round;
+    std::this_thread::sleep_for(60ms);  // the first one looks every 50 ms
+  }
+  EXPECT_TRUE(follows(plant, peer, 98)) << "nothing of the first one changes";
+  EXPECT_EQ(first.end(SIGKILL), -SIGKILL);
+  const ModbusProgram third(plant, plant.write(outputs_of(port, port.address(), 1)), "third.log");
+  EXPECT_TRUE(follows(plant, peer, 97)) << third.log();
+}
+
+TEST(ModbusProcess, DevicesThatOtherProcessesOnlyReadAndOtherUnitsAreFree) {
+  Plant plant;
+  Plant other;
+  Plant another;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  measure(peer, 5);
+  const ModbusProgram first(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  std::string reads = device(port);
+  reads.resize(reads.find("[[device.write]]"));
+  const ModbusProgram second(other, other.write(reads), "second.log");
+  EXPECT_TRUE(eventually([&] { return other.input_word(0) == 5; })) << second.log();
+  const ModbusProgram third(another, another.write(outputs_of(port, port.address(), 2)), "third.log");
+  EXPECT_TRUE(eventually([&] { return third.logged("1 device"); })) << third.log();
+}
+
 // By the status alone a PLC would take inputs for good whose firmware is gone.
 TEST(ModbusProcess, APlcSeesThatTheProcessIsGoneOrStandsStill) {
   Plant plant;

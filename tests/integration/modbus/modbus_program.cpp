@@ -126,6 +126,13 @@ ModbusProgram::~ModbusProgram() {
 int ModbusProgram::end(int signal) {
   if (pid_ <= 0) return -1;
   if (signal != 0) ::kill(pid_, signal);
+  // One that was to end by itself, and does not.
+  siginfo_t ended{};
+  const auto has_ended = [&] {
+    return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           ended.si_pid == pid_;
+  };
+  if (signal == 0 && !eventually(has_ended)) ::kill(pid_, SIGKILL);
   int status = 0;
   ::waitpid(std::exchange(pid_, -1), &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);

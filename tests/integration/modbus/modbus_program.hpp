@@ -65,8 +65,10 @@ class ModbusProgram {
   ModbusProgram(const ModbusProgram&) = delete;
   ModbusProgram& operator=(const ModbusProgram&) = delete;
 
-  /// Sends the signal; 0: none. Then waits for the end: the exit code, or minus the signal that ended it.
+  /// Sends the signal; 0: none, and it is killed if it goes on for long. Then waits for the end: the exit
+  /// code, or minus the signal that ended it.
   int end(int signal = 0);
+  [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] std::string log() const;
   [[nodiscard]] bool logged(std::string_view text) const { return log().find(text) != std::string::npos; }
 

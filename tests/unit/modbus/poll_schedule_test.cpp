@@ -85,6 +85,9 @@ TEST(ModbusEndpoint, IsNumeric) {
   EXPECT_TRUE(parse_endpoint("[::1]")->is_loopback());
   EXPECT_FALSE(parse_endpoint("0.0.0.0")->is_loopback());
   EXPECT_FALSE(parse_endpoint("[::]")->is_loopback());
+  EXPECT_EQ(parse_endpoint("127.3.0.1")->text(), "127.3.0.1:502");
+  EXPECT_EQ(parse_endpoint("[::ffff:127.3.0.1]:503")->text(), "127.3.0.1:503");
+  EXPECT_EQ(parse_endpoint("[FD00:0::10]")->text(), "[fd00::10]:502");
 }
 
 }  // namespace

@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/file.h>
 #include <sys/select.h>
 #include <sys/socket.h>
 
+#include "instances/io/modbus/client/device_claim.hpp"
 #include "instances/io/modbus/client/tcp_connect.hpp"
 #include "instances/io/modbus/client/tcp_exchange.hpp"
 #include "instances/io/modbus/config/endpoint.hpp"
@@ -57,6 +57,7 @@ Link::~Link() {
 
 void Link::close_line() noexcept {
   if (std::exchange(line_is_open_, false)) modbus_close(line_.get());
+  claim_.reset();
 }
 
 void Link::keep(UniqueFd connection) noexcept {
@@ -98,21 +99,33 @@ std::expected<Pdu, LinkFailure> Link::ask_tcp(const DeviceConfig& device, Limits
   }
 }
 
+Result<void> Link::claim(const DeviceConfig& device) {
+  if (!line_ || claim_) return {};
+  auto claim = claim_line(device.serial);
+  if (claim) {
+    claim_ = std::move(*claim);
+  } else if (claim.error().code == ErrorCode::busy) {
+    return std::unexpected(std::move(claim).error());
+  }
+  return {};  // a line that is not there is tried again with each poll
+}
+
+// The claim comes first: to open the line means to set its baud rate.
 std::expected<void, std::string> Link::open_line(const DeviceConfig& device) {
   if (line_is_open_) return {};
+  if (auto claimed = claim(device); !claimed) return Failure(claimed.error().describe());
   if (modbus_connect(line_.get()) != 0) {
-    return Failure(fmt::format("{}: {}", device.serial, modbus_strerror(errno)));
+    const int error = errno;
+    claim_.reset();
+    return Failure(fmt::format("{}: {}", device.serial, modbus_strerror(error)));
   }
-  const int fd = modbus_get_socket(line_.get());
-  const bool alone = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
-  if (fd < FD_SETSIZE && alone) {
-    line_is_open_ = true;
+  line_is_open_ = true;
+  if (modbus_get_socket(line_.get()) < FD_SETSIZE) {
     ++connection_;
     return {};
   }
-  modbus_close(line_.get());
-  return Failure(alone ? "too many open files for libmodbus"
-                       : fmt::format("{}: another process uses this line", device.serial));
+  close_line();
+  return Failure("too many open files for libmodbus");
 }
 
 // libmodbus waits for a whole response, and nothing interrupts it. So it does from the first byte on only.

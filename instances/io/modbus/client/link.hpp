@@ -31,6 +31,9 @@ class Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
+  /// Takes a serial line for this process, if it is there. busy: another process has it. Set-up.
+  [[nodiscard]] Result<void> claim(const DeviceConfig& device);
+
   /// The line is this thread's alone, until the end of what is returned: for several requests, or for values
   /// that must not grow old while others have their turn.
   using Turn = std::unique_lock<std::recursive_mutex>;
@@ -79,6 +82,7 @@ class Link {
   const StopEvent& stop_;
   std::recursive_mutex turn_;  ///< held for one request, and for what follows
   bool line_is_open_ = false;
+  UniqueFd claim_;            ///< of the line; a name whose device is gone would stay with it
   std::uint16_t number_ = 0;  ///< of the last request on TCP
   std::atomic<std::uint64_t> connection_{0};
   std::mutex descriptor_;  ///< for changes of tcp_ beside turn_, and never held while waiting

@@ -119,8 +119,7 @@ void check_registers(const ModbusConfig& config, std::vector<ConfigProblem>& pro
 // One text for each address, however it is written.
 std::string address_of(const DeviceConfig& device) {
   const auto endpoint = parse_endpoint(device.tcp);
-  if (device.tcp.empty() || !endpoint) return device.serial + device.tcp;
-  return {reinterpret_cast<const char*>(&endpoint->address), endpoint->size};
+  return device.tcp.empty() || !endpoint ? device.serial + device.tcp : endpoint->text();
 }
 
 void check_device_addresses(const std::vector<DeviceConfig>& devices, std::vector<ConfigProblem>& problems) {

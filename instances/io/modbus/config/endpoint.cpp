@@ -1,6 +1,8 @@
 #include "instances/io/modbus/config/endpoint.hpp"
 
+#include <array>
 #include <charconv>
+#include <cstddef>
 #include <cstring>
 #include <optional>
 #include <system_error>
@@ -46,6 +48,23 @@ bool Endpoint::is_loopback() const noexcept {
   }
   constexpr std::uint32_t kLoopbackNet = 127;
   return ntohl(address_of<sockaddr_in>(*this).sin_addr.s_addr) >> 24U == kLoopbackNet;
+}
+
+std::string Endpoint::text() const {
+  std::array<char, INET6_ADDRSTRLEN> host{};
+  if (family() == AF_INET) {
+    const auto four = address_of<sockaddr_in>(*this);
+    (void)::inet_ntop(AF_INET, &four.sin_addr, host.data(), host.size());
+    return fmt::format("{}:{}", host.data(), ntohs(four.sin_port));
+  }
+  const auto six = address_of<sockaddr_in6>(*this);
+  if (IN6_IS_ADDR_V4MAPPED(&six.sin6_addr)) {
+    constexpr std::size_t kBefore = 12;
+    (void)::inet_ntop(AF_INET, &six.sin6_addr.s6_addr[kBefore], host.data(), host.size());
+    return fmt::format("{}:{}", host.data(), ntohs(six.sin6_port));
+  }
+  (void)::inet_ntop(AF_INET6, &six.sin6_addr, host.data(), host.size());
+  return fmt::format("[{}]:{}", host.data(), ntohs(six.sin6_port));
 }
 
 std::expected<Endpoint, std::string> parse_endpoint(std::string_view text) {

@@ -15,6 +15,8 @@ struct Endpoint {
   socklen_t size = 0;
   [[nodiscard]] int family() const noexcept { return address.ss_family; }
   [[nodiscard]] bool is_loopback() const noexcept;
+  /// One text for each address, however it is written: "192.168.1.10:502", "[fd00::10]:502".
+  [[nodiscard]] std::string text() const;
 };
 
 inline constexpr std::string_view kEndpointForm =
