@@ -315,7 +315,6 @@ class Plan {
       member: member ?? '',
     };
     if (member === undefined && variable.section !== 'external') variable.section = 'other';
-    this.noteDropped(declaration, name);
     const element = declaration.type.elementTypeName?.toUpperCase();
     const type = element ?? declaration.type.name.toUpperCase();
     if (/^CTU?D(_\w+)?$/.test(type) && !this.blocks.has(type)) this.remark(node, `${name}: STruC++ counts falling edges of CD of ${type}; IEC 61131-3 counts rising ones`);
@@ -347,7 +346,14 @@ class Plan {
     if (declaration.initialValue?.kind === 'ArrayLiteralExpression') this.dropped.set(`${placeOf(declaration)}`, { place: placeOf(declaration), name });
   }
 
-  // The compiler says nothing of either.
+  noteAllDropped(blocks) {
+    for (const block of blocks) {
+      for (const declaration of block.declarations) this.noteDropped(declaration, namesAsWritten(declaration)[0]);
+    }
+  }
+
+  // The compiler says nothing of either. Arrays of function blocks, functions, methods and of VAR_GLOBAL outside of a
+  // CONFIGURATION begin as they should.
   checkWhatIsDropped() {
     for (const { name, definition } of this.ast.types) {
       for (const field of definition.kind === 'StructDefinition' ? definition.fields : []) this.noteDropped(field, `${name}.${field.names[0]}`);
@@ -500,6 +506,7 @@ class Plan {
     };
     for (const configuration of this.ast.configurations) {
       for (const block of configuration.varBlocks) add(block, (name) => `${name}.value`);
+      this.noteAllDropped(configuration.varBlocks);
     }
     for (const block of this.ast.globalVarBlocks) add(block, (name) => name);
     return { names, found };
@@ -512,6 +519,7 @@ class Plan {
       for (const pou of list) pous.push({ kind, name: nameAsWritten(pou, words[kind]), place: placeOf(pou), variables: variables(pou, className(pou)) });
     };
     user('program', this.ast.programs, (pou) => `Program_${pou.name}`, (pou, name) => [...this.declared(pou, name), ...this.reached(pou)]);
+    for (const pou of this.ast.programs) this.noteAllDropped(pou.varBlocks);
     user('function_block', this.ast.functionBlocks, (pou) => pou.name, (pou) => this.blockVariables(pou));
     user('function', this.ast.functions, (pou) => pou.name, (pou) => this.reached(pou));
     for (const name of this.classes.keys()) {

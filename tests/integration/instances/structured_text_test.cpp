@@ -360,6 +360,38 @@ TEST_F(TranslatedByStrucpp, ThatStrucppRefusesIsToldInItsOwnWords) {
               HasSubstr("own: STruC++ knows no VAR_GLOBAL in a RESOURCE"));
 }
 
+TEST_F(TranslatedByStrucpp, ArraysThatBeginWithZerosAreToldAndNoOthers) {
+  const ProgramEnd end = build(R"(TYPE Row : STRUCT
+  inRow : ARRAY [1..2] OF INT := [1, 2]; END_STRUCT; END_TYPE
+VAR_GLOBAL outside : ARRAY [1..2] OF INT := [1, 2]; END_VAR
+FUNCTION_BLOCK Fb
+VAR_INPUT given : ARRAY [1..2] OF INT := [1, 2]; END_VAR
+VAR own : ARRAY [1..2] OF INT := [1, 2]; r : Row; END_VAR
+VAR_OUTPUT n : INT; END_VAR
+METHOD Sum : INT VAR inMethod : ARRAY [1..2] OF INT := [1, 2]; END_VAR Sum := inMethod[1]; END_METHOD
+n := own[1] + given[2] + outside[1] + Sum();
+END_FUNCTION_BLOCK
+PROGRAM Prg VAR b : Fb;
+  inProgram, second : ARRAY [1..2] OF INT := [1, 2]; END_VAR
+VAR_TEMP
+  temporary : ARRAY [1..2] OF INT := [1, 2]; END_VAR
+VAR_EXTERNAL inside : ARRAY [1..2] OF INT; END_VAR
+  b(); inProgram[1] := temporary[1] + inside[1];
+END_PROGRAM
+CONFIGURATION k VAR_GLOBAL
+  inside : ARRAY [1..2] OF INT := [1, 2]; END_VAR
+RESOURCE r ON PLC TASK t (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM m WITH t : Prg; END_RESOURCE END_CONFIGURATION)",
+                               "arrays", "strucpp");
+  ASSERT_TRUE(end.success()) << end.output;
+  const std::string told = ": note: STruC++ drops the initial values of the array ";
+  for (const char* const place : {"2:3", "12:3", "14:3", "19:3"}) {
+    EXPECT_THAT(end.output, HasSubstr(fmt::format("arrays.st:{}{}", place, told)));
+  }
+  for (const char* const name : {"outside", "given", "own", "inMethod"}) {
+    EXPECT_THAT(end.output, Not(HasSubstr(told + name)));
+  }
+}
+
 TEST_F(TranslatedByStrucpp, ThatCountsDownIsToldOfTheEdge) {
   const ProgramEnd end = build(R"(
 PROGRAM Prg VAR c : CTD; up : CTU;
