@@ -240,6 +240,30 @@ TEST(ModbusProcess, AKilledProcessLeavesAnImageThatTheNextTakesOver) {
   EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
 }
 
+// The end of the first process has made them zero, or the silence before; no task has put them out since.
+TEST(ModbusProcess, AStartSwitchesKeptOutputsNotOnAgain) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const std::string config = plant.write(device(port));
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    ModbusProgram first(plant, config);
+    ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+    plant.keep(PLC_IMAGE_STATE_STOPPED);
+    EXPECT_EQ(first.end(signal), signal == SIGTERM ? 0 : -signal);
+    peer.with([](modbus_mapping_t& mapping) { mapping.tab_registers[7] = 0; });  // its watchdog
+    const ModbusProgram second(plant, config, "second.log");
+    const int requests = peer.requests();
+    ASSERT_TRUE(eventually([&] {
+      plant.beat();
+      return peer.requests() > requests + 100;  // of 10 ms and more
+    })) << second.log();
+    EXPECT_EQ(peer.holding(7), 0) << second.log();
+    plant.run();
+    EXPECT_TRUE(follows(plant, peer, 98)) << second.log();
+  }
+}
+
 // Words of an image that is opened anew.
 ::testing::AssertionResult first_word_becomes(const Plant& plant, const char* name, std::uint16_t wanted) {
   plc_image image{};

@@ -110,8 +110,8 @@ bool Device::outputs_of(Output& output, MapValues& values) {
   bool silent = false;
   output.image->look([&](std::span<const std::byte> bytes, const OutputImage::Shown& shown) {
     // Outputs that are only kept are not switched on again: a fault, a new process or the end says no values.
-    silent = shown.silence >= config_.silent_after || (output.fell_silent && shown.kept);
-    output.fell_silent = silent && (output.fell_silent || shown.silence != Duration::max());
+    // Nor are they by a start of this process, which does not know what silence was before.
+    silent = shown.silence >= config_.silent_after || (output.is_silent && shown.kept);
     if (!silent) values.read_from(*output.map, bytes);
   });
   tell_silence(output, silent);

@@ -57,8 +57,7 @@ class Device {
     bool is_written = false;
     std::uint64_t connection = 0;  ///< on which it was written
     TimePoint written_at;
-    bool is_silent = true;     ///< its PLC; at first nothing was put out
-    bool fell_silent = false;  ///< after it had put something out
+    bool is_silent = true;  ///< its PLC; at first nothing was put out
   };
 
   [[nodiscard]] LinkResult write_outputs();
