@@ -18,6 +18,7 @@
 #include "instances/adapters/matiec/loops.hpp"
 #include "instances/adapters/matiec/refused.hpp"
 #include "instances/adapters/matiec/statements.hpp"
+#include "instances/adapters/matiec/unknown_values.hpp"
 #include "instances/adapters/translator.hpp"
 
 namespace plchost {
@@ -41,6 +42,10 @@ class MatiecTranslator : public Translator {
     context_.refuse_persistent(context_.project, "MATIEC");
     std::ranges::move(matiec::refused_words(context_.sources), std::back_inserter(context_.report.problems));
     std::ranges::move(matiec::refused_names(context_.project), std::back_inserter(context_.report.problems));
+    if (context_.good()) {
+      std::ranges::move(matiec::refused_pous(context_.project, context_.sources),
+                        std::back_inserter(context_.report.problems));
+    }
     if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
     // Errors of the sources count more than a configuration that is missing.
     if (context_.good() && context_.project.configurations.empty() &&
@@ -133,6 +138,10 @@ class MatiecTranslator : public Translator {
     if (!end->success())
       problems = matiec::explained(std::move(problems), context_.sources, context_.project);
     std::ranges::move(problems, std::back_inserter(context_.report.problems));
+    if (context_.good() && !end->success()) {
+      std::ranges::move(matiec::unknown_values(context_.sources, context_.project),
+                        std::back_inserter(context_.report.problems));
+    }
     if (context_.good() && end->signal != 0) {
       context_.fail(
           fmt::format("iec2c was ended by SIG{}, and has not said which line it could not translate",

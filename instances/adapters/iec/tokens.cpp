@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -82,7 +83,7 @@ class Reader {
     for (;;) {
       step_while([](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
       if (begins("(*")) {
-        skip_comment("*)");
+        skip_old_comment();
       } else if (begins("/*") || begins("//")) {
         const std::size_t begin = position_;
         if (begins("/*")) {
@@ -95,6 +96,59 @@ class Reader {
         return !at_end();
       }
     }
+  }
+  // The second edition ends a comment at the first "*)", the third one counts those that begin within. A
+  // comment is of the third one if its own end would have no begin in the second one.
+  void skip_old_comment() {
+    if (!std::exchange(knows_nested_, true)) find_nested();
+    const auto nested = std::ranges::lower_bound(nested_, position_, {}, &Stretch::offset);
+    if (nested == nested_.end() || nested->offset != position_) return skip_comment("*)");
+    tokens_.new_comments.push_back(*nested);
+    step(nested->bytes);
+  }
+  void find_nested() {
+    const std::vector<std::size_t> strays = ends_without_begin();
+    std::vector<std::size_t> open;
+    for (std::size_t at = position_; at + 1 < text_.size() && !strays.empty(); ++at) {
+      const std::string_view two = text_.substr(at, 2);
+      if (two == "(*") {
+        open.push_back(at++);
+      } else if (two == "*)") {
+        if (!open.empty()) {
+          if (std::ranges::binary_search(strays, at)) nested_.push_back({open.back(), at + 2 - open.back()});
+          open.pop_back();
+        }
+        ++at;
+      }
+    }
+    std::ranges::sort(nested_, {}, &Stretch::offset);
+  }
+  // Each "*)" outside of comments and texts, as the second edition reads them.
+  [[nodiscard]] std::vector<std::size_t> ends_without_begin() const {
+    std::vector<std::size_t> ends;
+    const auto behind = [&](std::string_view end, std::size_t at) {
+      return std::min(text_.find(end, at), text_.size()) + end.size();
+    };
+    for (std::size_t at = position_; at + 1 < text_.size();) {
+      const std::string_view two = text_.substr(at, 2);
+      if (two == "(*") {
+        at = behind("*)", at + 2);
+      } else if (two == "/*") {
+        at = behind("*/", at + 2);
+      } else if (two == "//") {
+        at = behind("\n", at);
+      } else if (two == "*)") {
+        ends.push_back(at);
+        at += 2;
+      } else if (two[0] == '\'' || two[0] == '"') {
+        const char quote = text_[at++];
+        while (at < text_.size() && text_[at] != quote && text_[at] != '\n') at += text_[at] == '$' ? 2 : 1;
+        ++at;
+      } else {
+        ++at;
+      }
+    }
+    return ends;
   }
   void skip_comment(std::string_view end) {
     const SourcePlace begin = place_;
@@ -181,6 +235,8 @@ class Reader {
   std::string_view text_;
   std::size_t position_ = 0;
   SourcePlace place_;
+  bool knows_nested_ = false;
+  std::vector<Stretch> nested_;  // by their offset
   Tokens tokens_;
 };
 

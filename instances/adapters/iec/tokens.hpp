@@ -41,7 +41,7 @@ struct Stretch {
 
 struct Tokens {
   std::vector<Token> all;             ///< the last one is an `end`
-  std::vector<Stretch> new_comments;  ///< the comments of the third edition: // and /* */
+  std::vector<Stretch> new_comments;  ///< those of the third edition: //, /* */, and (* (* *) *)
   SourceProblems problems;
 };
 

@@ -313,6 +313,29 @@ iec::SourceProblems refused_names(const iec::Project& project) {
   return problems;
 }
 
+iec::SourceProblems refused_pous(const iec::Project& project, std::span<const iec::Source> sources) {
+  constexpr std::array<std::string_view, 3> kKinds{"PROGRAM", "FUNCTION_BLOCK", "FUNCTION"};
+  iec::SourceProblems problems;
+  for (const iec::Pou& pou : project.pous) {
+    if (!pou.variables.empty()) continue;
+    problems.push_back(
+        {pou.name_place, fmt::format("{} {} has no variables, and iec2c cannot translate it; declare one",
+                                     kKinds.at(std::to_underlying(pou.kind)), pou.name)});
+  }
+  for (const iec::Source& source : sources) {
+    const iec::Tokens tokens = iec::tokens_of(source.text, source.file);
+    const Token* before = nullptr;
+    for (const Token& token : tokens.all) {
+      if (before != nullptr && before->is("END_VAR") && token.is(";")) {
+        problems.push_back(
+            {token.place, "iec2c cannot translate a body that begins with ';'; write a statement there"});
+      }
+      if (token.kind != Token::Kind::pragma) before = &token;
+    }
+  }
+  return problems;
+}
+
 iec::SourceProblems refused_words(std::span<const iec::Source> sources) {
   iec::SourceProblems problems;
   const auto is_wide = [](const Token& token) {

@@ -340,6 +340,19 @@ TEST_F(TranslatedByMatiec, ThatIsWrongIsToldInItsOwnWords) {
   EXPECT_THAT(build(text).output, HasSubstr("'P' is also a name in the library of iec2c"));
   text = std::string("FUNCTION_BLOCK Motor METHOD Go END_METHOD END_FUNCTION_BLOCK ") + kTwice;
   EXPECT_THAT(build(text).output, HasSubstr("twice.st:1:22: METHOD: MATIEC knows the second edition"));
+  // iec2c ends at it without a place.
+  text = std::string("TYPE Mode : (idle, busy); Rec : STRUCT m : Mode; n : INT; END_STRUCT; END_TYPE\n") +
+         kTwice;
+  text.replace(text.find("late : TON;"), 11, "late : TON; r : Rec := (n := 1, m := bussy);");
+  EXPECT_THAT(build(text).output,
+              HasSubstr("twice.st:13:44: 'bussy' is no value of MODE; it has IDLE, BUSY"));
+}
+
+TEST_F(TranslatedByMatiec, ThatHasCommentsWithinCommentsIsBuilt) {
+  std::string text = kTwice;
+  text.replace(text.find("copied := around;"), 0, "(* copied (* (* more *) *) and\n more *) ");
+  const ProgramEnd built = build(text);
+  EXPECT_EQ(built.exit_code, 0) << built.output;
 }
 
 TEST_F(TranslatedByStrucpp, ThatStrucppRefusesIsToldInItsOwnWords) {

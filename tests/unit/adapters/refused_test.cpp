@@ -38,6 +38,29 @@ TEST(RefusedByMatiec, AreNamesThatAreMacrosOfC) {
       ElementsAre(HasSubstr("'M_PI'"), HasSubstr("'int_max'")));
 }
 
+std::vector<std::string> pous(const std::string& text) {
+  return texts(refused_pous(iec::read_project(source(text)).project, source(text)));
+}
+
+TEST(RefusedByMatiec, ArePousWithoutVariables) {
+  EXPECT_THAT(
+      pous(
+          "PROGRAM Main\n x := 1; END_PROGRAM\nFUNCTION_BLOCK Idle VAR END_VAR END_FUNCTION_BLOCK\n"
+          "FUNCTION Five : INT Five := 5; END_FUNCTION FUNCTION Id : INT VAR_INPUT a : INT; END_VAR Id := a; "
+          "END_FUNCTION"),
+      ElementsAre(
+          "a.st:1:9: PROGRAM Main has no variables, and iec2c cannot translate it; declare one",
+          "a.st:3:16: FUNCTION_BLOCK Idle has no variables, and iec2c cannot translate it; declare one",
+          "a.st:4:10: FUNCTION Five has no variables, and iec2c cannot translate it; declare one"));
+}
+
+TEST(RefusedByMatiec, AreBodiesThatBeginWithoutAStatement) {
+  EXPECT_THAT(
+      pous("PROGRAM Main VAR a : INT; END_VAR VAR_TEMP b : INT; END_VAR\n (* none *) ; END_PROGRAM"),
+      ElementsAre("a.st:2:13: iec2c cannot translate a body that begins with ';'; write a statement there"));
+  EXPECT_THAT(pous("PROGRAM Main VAR a : INT; END_VAR a := 1;; END_PROGRAM"), IsEmpty());
+}
+
 TEST(RefusedByMatiec, AreSuchNamesOfAConfiguration) {
   EXPECT_THAT(
       names("PROGRAM Main END_PROGRAM CONFIGURATION NAN RESOURCE Main ON PLC TASK eof (INTERVAL := T#1ms, "

@@ -44,6 +44,19 @@ TEST(IecTokens, SayWhatHasNoEnd) {
   EXPECT_EQ(describe(tokens_of("{a", "x.st").problems.at(0)), "x.st:1:1: this pragma has no '}'");
 }
 
+// The third edition counts the comments within. The second one does not, and many sources rely on it.
+TEST(IecTokens, CommentsWithinCommentsCountIfAllOfThemEnd) {
+  EXPECT_THAT(words_of("a (* b (* c *) d *) e"), ElementsAre("a", "e"));
+  EXPECT_THAT(words_of("a (* (* b *) (* (* c *) *) d *) e (* f *) g"), ElementsAre("a", "e", "g"));
+  EXPECT_THAT(words_of("a (* b (* c *) d"), ElementsAre("a", "d"));
+  EXPECT_THAT(words_of("a (* b (* c *) d (* e *) f (* g (* h *) i"), ElementsAre("a", "d", "f", "i"));
+  EXPECT_THAT(words_of("a (* '(*' *) b '*)' c"), ElementsAre("a", "b", "'*)'", "c"));
+  EXPECT_THAT(words_of("a // *)\n (* '(*' *) /* *) */ b"), ElementsAre("a", "b"));
+  EXPECT_EQ(tokens_of("a (* b (* c *) d *) (* e *)", "x.st").new_comments.size(), 1U);
+  const Tokens open = tokens_of(std::string(100'000, '(') + "*" + std::string(100'000, '*'), "x.st");
+  EXPECT_EQ(open.problems.size(), 1U);
+}
+
 TEST(IecTokens, SayWhereALetterIsNoneOfTheLanguage) {
   const Tokens tokens = tokens_of("(* \xC3\xA4 *) 'a\xC3\xA4'\n  z\xC3\xA4hler := 1;", "x.st");
   ASSERT_EQ(tokens.problems.size(), 1U);
