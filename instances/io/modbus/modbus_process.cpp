@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 
-#include "instances/io/modbus/client/device_claim.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
@@ -51,8 +50,10 @@ Result<void> ModbusProcess::add_devices() {
       PLCHOST_TRY_ASSIGN(line, Link::make(device, stop_));
       PLCHOST_TRY(line->claim(device));
     }
-    PLCHOST_TRY_ASSIGN(auto outputs, claim_outputs(device));
-    if (outputs) outputs_.push_back(std::move(outputs));
+    if (!device.tcp.empty() && !device.writes.empty()) {
+      PLCHOST_TRY_ASSIGN(auto outputs, OutputsClaim::take(config_.process.pool, device));
+      outputs_.push_back(std::move(outputs));
+    }
     devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
   }
   return {};
@@ -80,7 +81,6 @@ Result<void> ModbusProcess::run(int signals) {
     if (signal.revents != 0) break;
     const TimePoint now = MonotonicClock::now();
     for (const auto& device : devices_) device->count();
-    for (const UniqueFd& claim : outputs_) end_looks(claim);
     show(now, false);
     repair(now);
   }
@@ -129,6 +129,10 @@ void ModbusProcess::repair(TimePoint now) {
   repaired_at_ = now;
   for (const auto& [name, image] : images_.inputs()) {
     const auto repaired = image->repair();
+    if (!repaired && repair_pause_.is_over(now)) spdlog::error("{}", repaired.error().describe());
+  }
+  for (OutputsClaim& claim : outputs_) {
+    const auto repaired = claim.repair();
     if (!repaired && repair_pause_.is_over(now)) spdlog::error("{}", repaired.error().describe());
   }
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "instances/io/modbus/client/device.hpp"
+#include "instances/io/modbus/client/device_claim.hpp"
 #include "instances/io/modbus/client/link.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 #include "instances/io/modbus/images/image_table.hpp"
@@ -14,7 +15,6 @@
 #include "instances/io/modbus/threads/stop_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
-#include "shm/base/unique_fd.hpp"
 
 namespace plchost::modbus {
 
@@ -47,7 +47,7 @@ class ModbusProcess {
   StopEvent stop_;
   ImageTable images_;
   std::map<std::string, std::unique_ptr<Link>> lines_;  ///< by the serial device, or "tcp " and a name
-  std::vector<UniqueFd> outputs_;  ///< of devices on TCP, which no other process may write
+  std::vector<OutputsClaim> outputs_;                   ///< of devices on TCP
   std::vector<std::unique_ptr<Device>> devices_;
   std::unique_ptr<Server> server_;
   std::vector<Thread> threads_;

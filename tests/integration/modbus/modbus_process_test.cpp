@@ -3,6 +3,10 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <thread>
 
@@ -10,6 +14,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include "shm/files/pool_files.hpp"
 #include "tests/integration/modbus/device_of_a_test.hpp"
 #include "tests/integration/modbus/modbus_peer.hpp"
 #include "tests/integration/modbus/modbus_program.hpp"
@@ -139,57 +144,72 @@ TEST(ModbusProcess, AFileHasOneProcess) {
   EXPECT_TRUE(follows(plant, peer, 97)) << third.log();
 }
 
-// Without an input image, as any number of files may have it.
-std::string outputs_of(const HeldPort& port, std::string_view address, int unit) {
-  std::string text = device(port, fmt::format("unit = {}", unit));
-  text.erase(text.find("status_image"),
-             std::string_view("status_image = \"t.in\"\nstatus_offset = 56\n").size());
-  text.erase(text.find("[[device.read]]"), text.find("[[device.write]]") - text.find("[[device.read]]"));
-  text.replace(text.find(port.address()), port.address().size(), address);
-  return text;
+// A file of the same pool with an input image of its own.
+std::string other_file(const Plant& plant, std::string text) {
+  const std::string file = plant.write(text);
+  std::ifstream in(file);
+  text.assign(std::istreambuf_iterator<char>(in), {});
+  for (std::size_t at = text.find("t.in"); at != std::string::npos; at = text.find("t.in", at + 8))
+    text.replace(at, 4, "other.in");
+  std::ofstream(file) << text;
+  return file;
 }
 
 TEST(ModbusProcess, TheOutputsOfADeviceHaveOneProcess) {
   Plant plant;
-  Plant other;
   const HeldPort port;
   ModbusPeer peer(port);
-  const std::string config = plant.write(outputs_of(port, port.address(), 1));
+  const std::string config = plant.write(device(port));
   ModbusProgram first(plant, config);
   ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  std::string text = device(port);
   const std::string mapped = fmt::format("[::ffff:127.0.0.1]:{}", port.number());
-  for (int round = 0; round < 12; ++round) {
-    ModbusProgram second(other, other.write(outputs_of(port, mapped, 1)), fmt::format("{}.log", round));
-    ASSERT_EQ(second.end(), 1);
-    ASSERT_THAT(second.log(),
-                HasSubstr(fmt::format("device 'valves': process {} (plchost-modbus --config {}) writes the "
-                                      "outputs of {} unit 1; end that one, or put all maps of the device "
-                                      "into one file",
-                                      first.pid(), config, port.address())))
-        << round;
-    std::this_thread::sleep_for(60ms);  // the first one looks every 50 ms
-  }
+  text.replace(text.find(port.address()), port.address().size(), mapped);
+  ModbusProgram second(plant, other_file(plant, text), "second.log");
+  EXPECT_EQ(second.end(), 1);
+  EXPECT_THAT(second.log(), HasSubstr(fmt::format(
+                                "device 'valves': process {} (plchost-modbus --config {}) writes the outputs "
+                                "of {}/1; end that one, or put all maps of the device into one file",
+                                first.pid(), config, port.address())));
   EXPECT_TRUE(follows(plant, peer, 98)) << "nothing of the first one changes";
   EXPECT_EQ(first.end(SIGKILL), -SIGKILL);
-  const ModbusProgram third(plant, plant.write(outputs_of(port, port.address(), 1)), "third.log");
+  const ModbusProgram third(plant, other_file(plant, text), "third.log");
   EXPECT_TRUE(follows(plant, peer, 97)) << third.log();
+}
+
+// The end of a host removes the files of its pool.
+TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsRemoved) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  const ModbusProgram first(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  remove_pool_memories(plant.pool());
+  ASSERT_TRUE(eventually([&] {
+    for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
+      const std::string name = file.path().filename();
+      if (name.starts_with(plant.pool()) && name.find("modbus") != name.rfind("modbus")) return true;
+    }
+    return false;
+  })) << first.log();
+  ModbusProgram second(plant, other_file(plant, device(port)), "second.log");
+  EXPECT_EQ(second.end(), 1);
+  EXPECT_THAT(second.log(), HasSubstr("writes the outputs of"));
 }
 
 TEST(ModbusProcess, DevicesThatOtherProcessesOnlyReadAndOtherUnitsAreFree) {
   Plant plant;
-  Plant other;
-  Plant another;
   const HeldPort port;
   ModbusPeer peer(port);
-  measure(peer, 5);
   const ModbusProgram first(plant, plant.write(device(port)));
   ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
   std::string reads = device(port);
   reads.resize(reads.find("[[device.write]]"));
-  const ModbusProgram second(other, other.write(reads), "second.log");
-  EXPECT_TRUE(eventually([&] { return other.input_word(0) == 5; })) << second.log();
-  const ModbusProgram third(another, another.write(outputs_of(port, port.address(), 2)), "third.log");
-  EXPECT_TRUE(eventually([&] { return third.logged("1 device"); })) << third.log();
+  ModbusProgram second(plant, other_file(plant, reads), "second.log");
+  EXPECT_TRUE(eventually([&] { return second.logged("device 'valves' answers"); })) << second.log();
+  EXPECT_EQ(second.end(SIGTERM), 0);
+  const ModbusProgram third(plant, other_file(plant, device(port, "unit = 2")), "third.log");
+  EXPECT_TRUE(eventually([&] { return third.logged("device 'valves' answers"); })) << third.log();
 }
 
 // By the status alone a PLC would take inputs for good whose firmware is gone.

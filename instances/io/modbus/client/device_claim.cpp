@@ -3,32 +3,29 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
-#include <cstring>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <sys/types.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "instances/io/modbus/config/endpoint.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/system_call.hpp"
-#include "shm/log/log.hpp"
 
 namespace plchost::modbus {
 
 namespace {
 
-constexpr int kLooks = 8;
+constexpr std::uint32_t kClaimBytes = 1;  // of the image, which stays empty
 
 // "process 4711 (plchost-modbus --config a.toml)"
 std::string process_text(pid_t pid) {
@@ -64,22 +61,6 @@ pid_t holder_of(int fd) {
   return 0;
 }
 
-// A name that ends with its process, and leaves no file.
-sockaddr_un claim_address(std::string_view name, socklen_t& size) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::size_t length = std::min(name.size(), sizeof address.sun_path - 1);
-  name.copy(address.sun_path + 1, length);
-  size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
-  return address;
-}
-
-Result<UniqueFd> local_socket() {
-  UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (!fd) return failure(ErrorCode::system, "socket", errno);
-  return fd;
-}
-
 }  // namespace
 
 Result<UniqueFd> claim_line(const std::string& path) {
@@ -100,41 +81,45 @@ Result<UniqueFd> claim_line(const std::string& path) {
                              path, process_text(holder)));
 }
 
-Result<UniqueFd> claim_outputs(const DeviceConfig& device) {
-  const auto endpoint = parse_endpoint(device.tcp);
-  if (!endpoint || device.writes.empty()) return UniqueFd();
-  PLCHOST_TRY_ASSIGN(auto claim, local_socket());
-  socklen_t size = 0;
-  const sockaddr_un address =
-      claim_address(fmt::format("plchost-modbus/{}/{}", endpoint->text(), int{device.unit}), size);
-  const auto* const generic = reinterpret_cast<const sockaddr*>(&address);
-  if (::bind(claim.get(), generic, size) == 0) {
-    PLCHOST_TRY(check_errno(::listen(claim.get(), kLooks), "listen"));  // so that others see whose it is
-    return claim;
-  }
-  if (errno != EADDRINUSE) return failure(ErrorCode::system, "bind", errno);
-  PLCHOST_TRY_ASSIGN(const auto asking, local_socket());
-  ucred holder{};
-  socklen_t length = sizeof holder;
-  const bool is_known = (::connect(asking.get(), generic, size) == 0 || errno == EAGAIN) &&
-                        ::getsockopt(asking.get(), SOL_SOCKET, SO_PEERCRED, &holder, &length) == 0 &&
-                        holder.pid > 0;
-  // Any user may take any name. One who may not end this process may not keep it from its device either.
-  if (is_known && holder.uid != 0 && holder.uid != ::geteuid()) {
-    spdlog::warn("device '{}': {} of user {} says that it writes the outputs; nothing else is known of it",
-                 device.name, process_text(holder.pid), holder.uid);
-    return UniqueFd();
-  }
-  return failure(
-      ErrorCode::busy,
-      fmt::format("device '{}': {} writes the outputs of {} unit {}; end that one, or put all "
-                  "maps of the device into one file",
-                  device.name, process_text(is_known ? holder.pid : 0), endpoint->text(), int{device.unit}));
+void OutputsClaim::Close::operator()(plc_image* image) const noexcept {
+  plc_image_close(image);
+  delete image;
 }
 
-void end_looks(const UniqueFd& claim) noexcept {
-  while (UniqueFd(::accept4(claim.get(), nullptr, nullptr, SOCK_CLOEXEC))) {
+Result<OutputsClaim> OutputsClaim::take(const std::string& pool, const DeviceConfig& device) {
+  const auto endpoint = parse_endpoint(device.tcp);
+  const std::string address =
+      fmt::format("{}/{}", endpoint ? endpoint->text() : device.tcp, int{device.unit});
+  OutputsClaim claim(pool, device.name, address);
+  PLCHOST_TRY(claim.open());
+  return claim;
+}
+
+Result<void> OutputsClaim::open() {
+  const std::string name = "modbus/" + address_;
+  std::unique_ptr<plc_image, Close> image(new plc_image{});
+  const int error = plc_image_open(pool_.c_str(), name.c_str(), kClaimBytes, PLC_IMAGE_WRITE, image.get());
+  if (error == 0) {
+    image_ = std::move(image);
+    return {};
   }
+  if (error != EBUSY) {
+    return failure(ErrorCode::system,
+                   fmt::format("the claim '{}' of device '{}' in pool '{}'", name, device_, pool_), error);
+  }
+  const bool is_known =
+      plc_image_open(pool_.c_str(), name.c_str(), kClaimBytes, PLC_IMAGE_READ, image.get()) == 0;
+  const pid_t holder = is_known ? holder_of(image->descriptor) : 0;
+  return failure(ErrorCode::busy,
+                 fmt::format("device '{}': {} writes the outputs of {}; end that one, or put all maps of the "
+                             "device into one file",
+                             device_, process_text(holder), address_));
+}
+
+Result<void> OutputsClaim::repair() {
+  const std::string name = "modbus/" + address_;
+  if (plc_image_gone(image_.get(), pool_.c_str(), name.c_str()) == 0) return {};
+  return open();
 }
 
 }  // namespace plchost::modbus
