@@ -32,9 +32,9 @@ class Unanswered {
 
   /// A response of that shape may be one to an earlier request.
   [[nodiscard]] bool may_come(ResponseShape shape) const;
-  /// What to ask for instead of a request whose response may be an earlier one's, again and again until it is
-  /// none any more: another map, or less or more of one, whose response can be taken for no other. If there
-  /// is none, one that moves the earlier ones on. Nothing: `reads` has one map, and no other shape.
+  /// A map to read before a request whose response may be an earlier one's, until it cannot be that any more.
+  /// Its response can be taken for no other: it is another map, or less or more of one. If all may still
+  /// come, it moves the earlier ones on. Nothing: `reads` has one map, and no other shape.
   [[nodiscard]] std::optional<RegisterMap> probe(const std::vector<RegisterMap>& reads) const;
 
  private:
