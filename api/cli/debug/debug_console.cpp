@@ -309,6 +309,7 @@ Result<void> DebugConsole::go_on(std::string_view verb, const std::string& rest)
     task = "*";
   }
   PLCHOST_TRY(look());
+  passed_ = news_.told();
   PLCHOST_TRY_ASSIGN(const auto answer, link_.command(verb == "until" ? fmt::format("until {} {}", task, rest)
                                                                       : fmt::format("{} {}", verb, task)));
   if (const std::string remark = answer.value("remark", ""); !remark.empty()) print_line(remark);
@@ -327,18 +328,21 @@ Result<void> DebugConsole::wait(const std::string& seconds) {
   return wait_for_halt("", std::chrono::duration_cast<Duration>(std::chrono::duration<double>(given)));
 }
 
-// The halts that were told before do not count. A task that is named is let go before this.
+// A halt since the last go_on() counts, also one that was told while no command came. A task that is named is
+// let go before this.
 Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patience) {
   const TimePoint end = MonotonicClock::now() + patience;
-  const auto before = news_.told();
   for (;;) {
     PLCHOST_TRY(look());
     const bool halted = std::ranges::any_of(news_.told(), [&](const auto& entry) {
-      const auto known = before.find(entry.first);
+      const auto known = passed_.find(entry.first);
       return (task.empty() || task == entry.first) &&
-             (known == before.end() || known->second != entry.second);
+             (known == passed_.end() || known->second != entry.second);
     });
-    if (halted) return {};
+    if (halted) {
+      passed_ = news_.told();
+      return {};
+    }
     if (MonotonicClock::now() >= end || interrupted()) {
       return failure(ErrorCode::timed_out, fmt::format("{} within {:.1f} s",
                                                        task.empty() ? "no further task has halted"

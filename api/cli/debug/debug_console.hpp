@@ -56,6 +56,8 @@ class DebugConsole {
   std::string task_;        // that halted last, or was named
   std::int64_t frame_ = 0;  // of its stack
   DebugNews news_;
+  std::map<std::string, std::uint64_t>
+      passed_;  ///< halts before the last go_on(), and those that ended a wait
   bool failed_ = false;
 };
 

@@ -55,6 +55,22 @@ TEST_F(DebugConsoleTest, PrintSaysWhatIsForced) {
   EXPECT_EQ(said("print Main.t[]"), "Main.t[] = [3, 4]  elements forced\n");
 }
 
+// While no line comes, halts are told after 100 ms.
+TEST_F(DebugConsoleTest, WaitIsOverByAHaltThatWasToldSinceTheLastContinue) {
+  EXPECT_THAT(said("wait 0"), HasSubstr("task fast halts"));
+  EXPECT_THAT(said("wait 0"), HasSubstr("no further task has halted within"));
+  (void)said("continue");
+  instance_.halt("fast", 2, stack_);
+  testing::internal::CaptureStdout();
+  EXPECT_TRUE(sut_.look());
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), HasSubstr("task fast halts"));
+  EXPECT_EQ(said("wait 0"), "");
+  EXPECT_THAT(said("wait 0"), HasSubstr("no further task has halted within"));
+  instance_.halt("fast", 3, stack_);
+  (void)said("continue");
+  EXPECT_THAT(said("wait 0"), HasSubstr("no further task has halted within")) << "it is the one before";
+}
+
 class DebugConsoleFrames : public DebugConsoleTest {};
 
 TEST_F(DebugConsoleFrames, AreChosenByNumberAndByUpAndDown) {
