@@ -345,7 +345,8 @@ class PLCHOST_CLIENT_API Client {
   /// is reset. Else as write_variable().
   std::string force_variable(const std::string& host, const std::string& instance, const std::string& name,
                              const std::string& value);
-  /// The variable keeps the value that it has. ClientError: wrong_state: it is not forced; else as above.
+  /// The variable keeps the value that it has. "*": unforce_all(). ClientError: wrong_state: it is not
+  /// forced; else as above.
   std::string unforce_variable(const std::string& host, const std::string& instance, const std::string& name);
   /// Of all forced variables of the instance, also of none.
   std::string unforce_all(const std::string& host, const std::string& instance);

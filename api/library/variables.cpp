@@ -75,7 +75,9 @@ Async<Result<Forces>> list_forces(CallOrder& order, ClientCore& core, std::strin
   co_return forces;
 }
 
-// The host would take "a=b" for a and a value, and "*" for all that are forced.
+constexpr std::string_view kAllForced = "*";
+
+// The host would take "a=b" for a and a value. A pattern names no single variable.
 std::string variable_name(const std::string& name) {
   const bool good =
       !name.empty() && name.find_first_of("=*?") == std::string::npos && is_printable_utf8(name);
@@ -137,11 +139,12 @@ std::string Client::force_variable(const std::string& host, const std::string& i
 
 std::string Client::unforce_variable(const std::string& host, const std::string& instance,
                                      const std::string& name) {
+  if (name == kAllForced) return unforce_all(host, instance);
   return command("unforce variable", host, instance, variable_name(name));
 }
 
 std::string Client::unforce_all(const std::string& host, const std::string& instance) {
-  return command("unforce variable", host, instance, "*");
+  return command("unforce variable", host, instance, std::string(kAllForced));
 }
 
 }  // namespace plchost

@@ -118,7 +118,7 @@ void define_variables(ClientClass& client) {
       .def("force_variable", &Client::force_variable, py::arg("host"), py::arg("instance"), py::arg("name"),
            py::arg("value"), "The variable has this value at the begin and the end of each cycle.", NoGil())
       .def("unforce_variable", &Client::unforce_variable, py::arg("host"), py::arg("instance"),
-           py::arg("name"), "The variable keeps the value that it has.", NoGil())
+           py::arg("name"), "The variable keeps the value that it has. '*': all that are forced.", NoGil())
       .def("unforce_all", &Client::unforce_all, py::arg("host"), py::arg("instance"),
            "All forced variables of the instance keep the values that they have.", NoGil())
       .def(

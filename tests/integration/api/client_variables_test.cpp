@@ -149,6 +149,9 @@ TEST_F(ClientVariables, AreForcedAndUnforced) {
   EXPECT_THAT(forces(), ElementsAre());
   EXPECT_EQ(value("grid[1,1]"), "99") << "it keeps the value that it has";
   EXPECT_EQ(sut_.unforce_all("hosta", "line1"), "no variable was forced");
+  sut_.force_variable("hosta", "line1", "grid[1,1]", "98");
+  sut_.unforce_variable("hosta", "line1", "*");
+  EXPECT_THAT(forces(), ElementsAre());
 }
 
 TEST_F(ClientVariables, AreRefusedByTheHost) {

@@ -140,12 +140,15 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
     client.force_variable(*of, name="grid[1,1]", value="99")
     client.unforce_all(*of)
     assert client.forces("north") == []
+    client.force_variable(*of, "grid[1,1]", "98")
+    client.unforce_variable(*of, "*")
+    assert client.forces("north") == []
     error = plchost_client.ClientError
     assert "did you mean" in refused(error.not_found, client.write_variable, *of, "line.totel", "1")
     refused(error.refused, client.force_variable, *of, "line.stopped", "TRUE")
     refused(error.wrong_state, client.unforce_variable, *of, "line.total")
     refused(error.invalid_argument, client.write_variable, *of, "line.total=5", "1")
-    refused(error.invalid_argument, client.unforce_variable, *of, "*")
+    refused(error.invalid_argument, client.unforce_variable, *of, "line.*")
     refused(error.not_found, client.forces, "north", "press7")
     assert "10 to 3600000" in refused(error.invalid_argument, client.watch_variables, *of, ["fast.*"], 0.001, print)
     unknown = threading.Event()
