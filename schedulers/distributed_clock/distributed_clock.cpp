@@ -32,6 +32,8 @@ void DistributedClock::configure(const DistributedClockSettings& settings) {
   regulator_ = ClockRegulator(settings);
   known_.usable = 0;
   known_.any = 0;
+  known_.began = {};
+  known_.left_out = ClockSilence::nothing;
   shared_.write(known_);
   for (const auto& follower : followers_) follower->begin();
 }
@@ -68,7 +70,9 @@ ReferenceSource::Reading DistributedClock::reported() const noexcept {
 void DistributedClock::poll(TimePoint now) noexcept {
   if (polling_.exchange(true, std::memory_order_acquire)) return;
   const auto reading = source_ != nullptr ? source_->read() : reported();
-  if (consume(reading, now)) shared_.write(known_);
+  const bool first = known_.began == TimePoint{};
+  if (first) known_.began = now;
+  if (consume(reading, now) || first) shared_.write(known_);
   polling_.store(false, std::memory_order_release);
   last_poll_.store(now.time_since_epoch().count(), std::memory_order_relaxed);
 }
@@ -79,7 +83,7 @@ bool DistributedClock::consume(const ReferenceSource::Reading& reading, TimePoin
     case ReferenceSource::Outcome::nothing:
       return false;
     case ReferenceSource::Outcome::corrupt:
-      ++known_.rejected;
+      leave_out(ClockSilence::corrupt);
       return true;
     case ReferenceSource::Outcome::invalid:
     case ReferenceSource::Outcome::pair:
@@ -88,25 +92,32 @@ bool DistributedClock::consume(const ReferenceSource::Reading& reading, TimePoin
   if (std::exchange(updates_, reading.updates) == reading.updates) return false;
   if (reading.outcome == ReferenceSource::Outcome::invalid) {
     ++known_.invalid;
+    known_.left_out = ClockSilence::invalid;
   } else {
     feed(reading.pair, now);
   }
   return true;
 }
 
+void DistributedClock::leave_out(ClockSilence why) noexcept {
+  ++known_.rejected;
+  known_.left_out = why;
+}
+
 void DistributedClock::feed(const ReferencePair& pair, TimePoint now) noexcept {
   // Compared this way round because a stranger's stamp may lie anywhere.
   if (pair.local > now + kStampLead || pair.local < now - settings_.reference_timeout) {
-    ++known_.rejected;
+    leave_out(ClockSilence::other_time);
     return;
   }
+  const bool stands_still = std::exchange(shown_ns_, pair.reference_ns) == pair.reference_ns;
   switch (regulator_.feed(pair)) {
     case ClockRegulator::Verdict::skipped:
       return;
     case ClockRegulator::Verdict::outlier:
     case ClockRegulator::Verdict::out_of_order:
     case ClockRegulator::Verdict::out_of_range:
-      ++known_.rejected;
+      leave_out(stands_still ? ClockSilence::stands_still : ClockSilence::no_clock);
       return;
     case ClockRegulator::Verdict::stepped:
       ++known_.steps;
@@ -116,6 +127,7 @@ void DistributedClock::feed(const ReferencePair& pair, TimePoint now) noexcept {
   }
   ++known_.pairs;
   known_.any = 1;
+  known_.left_out = ClockSilence::nothing;
   known_.last_pair = pair.local;
   known_.model = regulator_.model();
   known_.bias_ns = regulator_.bias_ns();
@@ -141,6 +153,8 @@ ClockStatus DistributedClock::status(const ClockFollower& follower) const noexce
     status.state = within ? ClockState::locked : ClockState::acquiring;
   }
   if (!steering && fresh) status.state = ClockState::measuring;
+  const TimePoint since = seen->any != 0 ? std::max(seen->last_pair, seen->began) : seen->began;
+  if (since != TimePoint{} && looked - since > settings_.reference_timeout) status.silence = seen->left_out;
   constexpr double kPpb = 1e9;
   status.drift_ppb = std::llround(seen->model.drift * kPpb);
   status.pairs = seen->pairs;

@@ -23,9 +23,21 @@ enum class ClockState : std::uint32_t {
   measuring = 5,     ///< the clock is measured, but this scheduler cannot move its releases
 };
 
+/// Why no pair was taken for the timeout.
+enum class ClockSilence : std::uint32_t {
+  none = 0,      ///< pairs are taken, or the timeout is not over
+  nothing,       ///< nobody has written one
+  stands_still,  ///< the reference shows the same time again and again
+  no_clock,      ///< its times lie on no line that a clock can have
+  other_time,    ///< the local stamps are not of now
+  invalid,       ///< the writer says that its clock does not hold
+  corrupt,       ///< the record was written by no writer of ours
+};
+
 /// The state of the clock, seen from one task. Durations in nanoseconds.
 struct ClockStatus {
   ClockState state = ClockState::off;
+  ClockSilence silence = ClockSilence::none;
   bool in_sync = false;  ///< the task's releases are within the window, or were when the reference stopped
   std::int64_t offset_ns =
       0;  ///< of the task's planned releases from the reference grid, as measured; > 0: late
@@ -80,6 +92,8 @@ class DistributedClock {
     ClockModel model;
     double bias_ns = 0;
     TimePoint last_pair;
+    TimePoint began;                                // the first look since configure()
+    ClockSilence left_out = ClockSilence::nothing;  // the newest one that was not taken
     std::uint32_t usable = 0;
     std::uint32_t any = 0;  // a pair was taken since configure()
     std::uint64_t pairs = 0;
@@ -95,6 +109,7 @@ class DistributedClock {
   void poll(TimePoint now) noexcept;
   [[nodiscard]] bool consume(const ReferenceSource::Reading& reading, TimePoint now) noexcept;
   void feed(const ReferencePair& pair, TimePoint now) noexcept;
+  void leave_out(ClockSilence why) noexcept;
   [[nodiscard]] ReferenceSource::Reading reported() const noexcept;
   [[nodiscard]] bool active() const noexcept { return active_.load(std::memory_order_acquire); }
 
@@ -104,10 +119,11 @@ class DistributedClock {
   std::atomic<bool> active_{false};
   std::atomic<bool> steering_{false};
 
-  std::atomic<bool> polling_{false};  // the thread that sets it owns the next four
+  std::atomic<bool> polling_{false};  // the thread that sets it owns the next five
   ReferenceSource* source_ = nullptr;
   ClockRegulator regulator_;
   std::uint64_t updates_ = 0;
+  std::int64_t shown_ns_ = 0;  // by the reference, in the newest pair
   Shared known_;
 
   Seqlock<Shared> shared_;

@@ -311,6 +311,17 @@ void Instance::report_tick() {
   tick_ = std::move(now);
 }
 
+// A clock that cannot be read is told by its Reference, which knows more.
+void Instance::report_clock(ClockRuntime& clock) {
+  if (reference_ && !reference_->problem().empty()) clock.problem.assign(reference_->problem());
+  const std::string_view silence =
+      reference_ && reference_->problem().empty() ? clock.problem.view() : std::string_view();
+  if (silence == clock_silence_) return;
+  if (!silence.empty()) spdlog::warn("{}; the grids go on without it", silence);
+  if (silence.empty() && clock.state != 0) spdlog::info("the reference clock is followed again");
+  clock_silence_ = silence;
+}
+
 static_assert(PLC_IMAGE_SIGN_NS == Duration(Instance::kHeartbeat).count());
 
 void Instance::beat() {
@@ -345,7 +356,7 @@ void Instance::beat() {
   if (application_) runtime.application.assign(application_->path());
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
   runtime.clock.reference.assign(start_.settings.scheduler.distributed_clock.reference);
-  if (reference_) runtime.clock.problem.assign(reference_->problem());
+  report_clock(runtime.clock);
   runtime.variables = static_cast<std::uint32_t>(host_->variables().count());
   runtime.forces = static_cast<std::uint32_t>(host_->variables().forces().size());
   runtime.retain_problem.assign(host_->areas().retain_problem());

@@ -186,6 +186,7 @@ class Instance {
   [[nodiscard]] Result<void> become_own_user();
   void choose_scheduler();
   void report_tick();
+  void report_clock(ClockRuntime& clock);
   void make_outputs_safe(const TaskSet::Fault& fault);
   [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
   [[nodiscard]] Result<void> restore_operator_events();
@@ -210,6 +211,7 @@ class Instance {
   TimePoint page_told_;                   // when it was told last that the page was written over
   std::uint64_t page_damages_ = 0;        // how often it was
   std::unique_ptr<Reference> reference_;  // null: none is named
+  std::string clock_silence_;             // as the log has it; empty: it is followed
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them
   std::unique_ptr<OnlineChange> change_;  // waits for a moment between all cycles

@@ -1,5 +1,7 @@
 #include "instances/runtime/time/reference.hpp"
 
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "instances/runtime/settings/reference_name.hpp"
@@ -8,6 +10,20 @@
 #include "shm/log/log.hpp"
 
 namespace plchost {
+
+namespace {
+
+// In the order of ClockSilence.
+constexpr std::array<std::string_view, 7> kSilences{
+    "",
+    "the reference clock is silent: nobody has written its time for ReferenceTimeoutMs",
+    "the reference clock stands still: it shows the same time again and again",
+    "the times of the reference clock lie on no line that a clock has, and are left out",
+    "the local stamps of the reference clock are not of now, and are left out",
+    "the reference clock does not hold, as its writer says",
+    "the record of the reference clock was overwritten by another program"};
+
+}  // namespace
 
 void Reference::tell(std::string problem) {
   if (!problem.empty() && problem != problem_) spdlog::error("{}; the clock runs freely", problem);
@@ -30,6 +46,7 @@ ClockRuntime clock_runtime(const DistributedClock& clock) noexcept {
   if (clock.leading() == nullptr) return runtime;
   const ClockStatus status = clock.status(*clock.leading());
   runtime.state = std::to_underlying(status.state);
+  runtime.problem.assign(kSilences.at(std::to_underlying(status.silence)));
   runtime.in_sync = status.in_sync ? 1 : 0;
   runtime.offset_ns = status.offset_ns;
   runtime.drift_ppb = status.drift_ppb;

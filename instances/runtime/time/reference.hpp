@@ -39,7 +39,7 @@ class Reference {
                                                           const DistributedClockSettings& settings,
                                                           const std::string& pool);
 
-/// How the status page describes the clock: all but the name of the reference.
+/// How the status page describes the clock: all but the name of the reference, and why it cannot be read.
 [[nodiscard]] ClockRuntime clock_runtime(const DistributedClock& clock) noexcept;
 
 }  // namespace plchost

@@ -78,7 +78,7 @@ TEST_F(HostClockAsReference, IsADeviceInEachOfTheWaysThatItCanBeRead) {
     EXPECT_TRUE(eventually([&] { return std::abs(clock().drift_ppb - 120'000) < 2000; })) << way;
     EXPECT_TRUE(eventually([&] { return std::abs(phase_ns()) < 2000; })) << way;
     EXPECT_EQ(clock().reference.view(), std::string("ptp:") + kPtpDevice);
-    EXPECT_EQ(clock().problem.view(), "");
+    EXPECT_TRUE(eventually([&] { return clock().problem.view().empty(); })) << clock().problem.view();
     EXPECT_THAT(sut->log(), HasSubstr(fmt::format("follow {} ({})", kPtpDevice, told)));
     EXPECT_EQ(sut->end(SIGTERM), 0);
   }
@@ -103,13 +103,28 @@ TEST_F(HostClockAsReference, DeviceThatGoesIsHoldOverUntilItIsThereAgain) {
   EXPECT_THAT(sut->log(), HasSubstr("the clock runs freely"));
   give_back();
   EXPECT_TRUE(becomes(ClockState::locked)) << sut->log();
-  EXPECT_EQ(clock().problem.view(), "");
+  EXPECT_TRUE(eventually([&] { return clock().problem.view().empty(); })) << clock().problem.view();
   take_away();
   EXPECT_TRUE(becomes(ClockState::hold_over));
   EXPECT_TRUE(eventually([&] { return !clock().problem.view().empty(); }));
   EXPECT_EQ(clock().in_sync, 1U) << "the last drift is good for a while";
   give_back();
   EXPECT_TRUE(becomes(ClockState::locked)) << sut->log();
+}
+
+// It is read without an error, and shows the same time each time.
+TEST_F(HostClockAsReference, DeviceThatStandsStillIsToldUntilItGoesAgain) {
+  write_phc(-1'000'000'000, 0, "extended");
+  start_on_device();
+  EXPECT_TRUE(tells("the reference clock stands still")) << clock().problem.view();
+  EXPECT_TRUE(becomes(ClockState::free_running));
+  write_phc(80'000, 0, "extended");
+  EXPECT_TRUE(becomes(ClockState::locked)) << sut->log();
+  EXPECT_TRUE(eventually([&] { return clock().problem.view().empty(); })) << clock().problem.view();
+  write_phc(-1'000'000'000, 0, "extended");
+  EXPECT_TRUE(tells("the reference clock stands still")) << clock().problem.view();
+  EXPECT_TRUE(becomes(ClockState::hold_over));
+  EXPECT_THAT(sut->log(), HasSubstr("the reference clock stands still"));
 }
 
 TEST_F(HostClockAsReference, DeviceOfAnotherKindIsRefusedAndTheInstanceRuns) {

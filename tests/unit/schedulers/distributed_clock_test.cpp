@@ -239,6 +239,21 @@ TEST_P(FollowingBroken, IsHoldOverAndLocksAgainWithoutAJump) {
   EXPECT_LT(percentile(run(5000), 0.99), 100);
 }
 
+TEST_P(FollowingBroken, IsToldAfterTheTimeoutAndNoLongerThanItLasts) {
+  const auto why =
+      GetParam() == std::string_view("Frozen") ? ClockSilence::stands_still : ClockSilence::no_clock;
+  run_broken(250);
+  EXPECT_EQ(status().silence, ClockSilence::none) << "within the timeout";
+  run_broken(2000);
+  EXPECT_EQ(status().silence, why);
+  run(1000);
+  EXPECT_EQ(status().silence, ClockSilence::none);
+  run_broken(250);
+  EXPECT_EQ(status().silence, ClockSilence::none);
+  run_broken(2000);
+  EXPECT_EQ(status().silence, why);
+}
+
 TEST_P(FollowingBroken, MovesNothingIfThereWasNoOtherYet) {
   run_broken(200);
   EXPECT_EQ(status().state, ClockState::acquiring);
@@ -292,6 +307,33 @@ TEST_F(Following, RejectsCorruptRecordsAndStampsOfAnotherTime) {
   run(1);
   EXPECT_EQ(status().rejected, 7U);
   EXPECT_EQ(status().pairs, pairs);
+}
+
+TEST_F(Following, SaysWhyNoPairIsTaken) {
+  writing = false;
+  run(250);
+  EXPECT_EQ(status().silence, ClockSilence::none);
+  run(100);
+  EXPECT_EQ(status().silence, ClockSilence::nothing);
+  writing = true;
+  run(1000);
+  EXPECT_EQ(status().silence, ClockSilence::none);
+  writing = false;
+  run(400);
+  EXPECT_EQ(status().silence, ClockSilence::nothing);
+  record.write_invalid();
+  run(1);
+  EXPECT_EQ(status().silence, ClockSilence::invalid);
+  record.corrupt();
+  run(1);
+  EXPECT_EQ(status().silence, ClockSilence::corrupt);
+  ReferencePair old = reference.stamp(release);
+  old.local = release - seconds(1);
+  record.write(old);
+  run(1);
+  EXPECT_EQ(status().silence, ClockSilence::other_time);
+  sut.configure(settings);
+  EXPECT_EQ(status().silence, ClockSilence::none);
 }
 
 TEST_F(Following, OnlyMeasuresWhereReleasesCannotBeMoved) {
