@@ -83,7 +83,8 @@ bool DistributedClock::consume(const ReferenceSource::Reading& reading, TimePoin
     case ReferenceSource::Outcome::nothing:
       return false;
     case ReferenceSource::Outcome::corrupt:
-      leave_out(ClockSilence::corrupt);
+      ++known_.rejected;
+      leave_out(ClockSilence::corrupt, now);
       return true;
     case ReferenceSource::Outcome::invalid:
     case ReferenceSource::Outcome::pair:
@@ -92,22 +93,23 @@ bool DistributedClock::consume(const ReferenceSource::Reading& reading, TimePoin
   if (std::exchange(updates_, reading.updates) == reading.updates) return false;
   if (reading.outcome == ReferenceSource::Outcome::invalid) {
     ++known_.invalid;
-    known_.left_out = ClockSilence::invalid;
+    leave_out(ClockSilence::invalid, now);
   } else {
     feed(reading.pair, now);
   }
   return true;
 }
 
-void DistributedClock::leave_out(ClockSilence why) noexcept {
-  ++known_.rejected;
+void DistributedClock::leave_out(ClockSilence why, TimePoint now) noexcept {
   known_.left_out = why;
+  known_.left_out_at = now;
 }
 
 void DistributedClock::feed(const ReferencePair& pair, TimePoint now) noexcept {
   // Compared this way round because a stranger's stamp may lie anywhere.
   if (pair.local > now + kStampLead || pair.local < now - settings_.reference_timeout) {
-    leave_out(ClockSilence::other_time);
+    ++known_.rejected;
+    leave_out(ClockSilence::other_time, now);
     return;
   }
   const bool stands_still = std::exchange(shown_ns_, pair.reference_ns) == pair.reference_ns;
@@ -117,7 +119,8 @@ void DistributedClock::feed(const ReferencePair& pair, TimePoint now) noexcept {
     case ClockRegulator::Verdict::outlier:
     case ClockRegulator::Verdict::out_of_order:
     case ClockRegulator::Verdict::out_of_range:
-      leave_out(stands_still ? ClockSilence::stands_still : ClockSilence::no_clock);
+      ++known_.rejected;
+      leave_out(stands_still ? ClockSilence::stands_still : ClockSilence::no_clock, now);
       return;
     case ClockRegulator::Verdict::stepped:
       ++known_.steps;
@@ -154,7 +157,10 @@ ClockStatus DistributedClock::status(const ClockFollower& follower) const noexce
   }
   if (!steering && fresh) status.state = ClockState::measuring;
   const TimePoint since = seen->any != 0 ? std::max(seen->last_pair, seen->began) : seen->began;
-  if (since != TimePoint{} && looked - since > settings_.reference_timeout) status.silence = seen->left_out;
+  if (since != TimePoint{} && looked - since > settings_.reference_timeout) {
+    const bool goes_on = looked - seen->left_out_at <= settings_.reference_timeout;
+    status.silence = goes_on ? seen->left_out : ClockSilence::nothing;
+  }
   constexpr double kPpb = 1e9;
   status.drift_ppb = std::llround(seen->model.drift * kPpb);
   status.pairs = seen->pairs;

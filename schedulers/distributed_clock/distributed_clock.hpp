@@ -94,6 +94,7 @@ class DistributedClock {
     TimePoint last_pair;
     TimePoint began;                                // the first look since configure()
     ClockSilence left_out = ClockSilence::nothing;  // the newest one that was not taken
+    TimePoint left_out_at;
     std::uint32_t usable = 0;
     std::uint32_t any = 0;  // a pair was taken since configure()
     std::uint64_t pairs = 0;
@@ -109,7 +110,7 @@ class DistributedClock {
   void poll(TimePoint now) noexcept;
   [[nodiscard]] bool consume(const ReferenceSource::Reading& reading, TimePoint now) noexcept;
   void feed(const ReferencePair& pair, TimePoint now) noexcept;
-  void leave_out(ClockSilence why) noexcept;
+  void leave_out(ClockSilence why, TimePoint now) noexcept;
   [[nodiscard]] ReferenceSource::Reading reported() const noexcept;
   [[nodiscard]] bool active() const noexcept { return active_.load(std::memory_order_acquire); }
 

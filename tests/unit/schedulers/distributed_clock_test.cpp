@@ -332,6 +332,8 @@ TEST_F(Following, SaysWhyNoPairIsTaken) {
   record.write(old);
   run(1);
   EXPECT_EQ(status().silence, ClockSilence::other_time);
+  run(400);
+  EXPECT_EQ(status().silence, ClockSilence::nothing) << "that was before";
   sut.configure(settings);
   EXPECT_EQ(status().silence, ClockSilence::none);
 }
