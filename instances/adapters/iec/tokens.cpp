@@ -142,7 +142,7 @@ class Reader {
         at += 2;
       } else if (two[0] == '\'' || two[0] == '"') {
         const char quote = text_[at++];
-        while (at < text_.size() && text_[at] != quote && text_[at] != '\n') at += text_[at] == '$' ? 2 : 1;
+        while (at < text_.size() && text_[at] != quote && text_[at] != '\n') at += text_[at] == '$' ? 2U : 1U;
         ++at;
       } else {
         ++at;

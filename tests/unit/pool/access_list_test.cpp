@@ -20,8 +20,8 @@
 namespace plchost {
 namespace {
 
-constexpr uid_t kFirst = 64043;  // of no account
-constexpr uid_t kSecond = 64044;
+constexpr uid_t kFirstUser = 64043;  // of no account
+constexpr uid_t kSecondUser = 64044;
 constexpr gid_t kGroup = 64041;
 
 class AccessList : public testing::Test {
@@ -32,7 +32,8 @@ class AccessList : public testing::Test {
     file_.reset(::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600));
     ASSERT_TRUE(file_);
     ASSERT_EQ(::fchown(file_.get(), 0, kGroup), 0);
-    if (const auto lists = let({&kFirst, 1}, 6, 0640); !lists && lists.error().code == ErrorCode::unsupported)
+    if (const auto lists = let({&kFirstUser, 1}, 6, 0640);
+        !lists && lists.error().code == ErrorCode::unsupported)
       GTEST_SKIP() << lists.error().describe();
   }
   void TearDown() override {
@@ -61,41 +62,41 @@ class AccessList : public testing::Test {
 };
 
 TEST_F(AccessList, GivesUsersMoreThanTheGroupHas) {
-  ASSERT_TRUE(let({&kFirst, 1}, 6, 0640));
-  EXPECT_EQ(may(kFirst, kFirst), "rw");
-  EXPECT_EQ(may(kSecond, kGroup), "r");
-  EXPECT_EQ(may(kSecond, kSecond), "");
+  ASSERT_TRUE(let({&kFirstUser, 1}, 6, 0640));
+  EXPECT_EQ(may(kFirstUser, kFirstUser), "rw");
+  EXPECT_EQ(may(kSecondUser, kGroup), "r");
+  EXPECT_EQ(may(kSecondUser, kSecondUser), "");
   EXPECT_EQ(mode(), 0660U) << "the rights of users and group together";
 }
 
 TEST_F(AccessList, HasTheUsersOfTheLastCall) {
-  const std::array both{kSecond, kFirst, kSecond};
+  const std::array both{kSecondUser, kFirstUser, kSecondUser};
   ASSERT_TRUE(let(both, 6, 0640));
-  EXPECT_EQ(may(kFirst, kFirst), "rw");
-  EXPECT_EQ(may(kSecond, kSecond), "rw");
-  ASSERT_TRUE(let({&kSecond, 1}, 4, 0600));
-  EXPECT_EQ(may(kFirst, kFirst), "");
-  EXPECT_EQ(may(kSecond, kSecond), "r");
+  EXPECT_EQ(may(kFirstUser, kFirstUser), "rw");
+  EXPECT_EQ(may(kSecondUser, kSecondUser), "rw");
+  ASSERT_TRUE(let({&kSecondUser, 1}, 4, 0600));
+  EXPECT_EQ(may(kFirstUser, kFirstUser), "");
+  EXPECT_EQ(may(kSecondUser, kSecondUser), "r");
   ASSERT_TRUE(let({}, 0, 0640));
-  EXPECT_EQ(may(kSecond, kSecond), "");
-  EXPECT_EQ(may(kSecond, kGroup), "r");
+  EXPECT_EQ(may(kSecondUser, kSecondUser), "");
+  EXPECT_EQ(may(kSecondUser, kGroup), "r");
   EXPECT_EQ(mode(), 0640U);
 }
 
 // As systemd does with the folders of a service at each start.
 TEST_F(AccessList, IsWholeAgainAfterTheBitsWereChanged) {
-  ASSERT_TRUE(let({&kFirst, 1}, 6, 0640));
+  ASSERT_TRUE(let({&kFirstUser, 1}, 6, 0640));
   ASSERT_EQ(::fchmod(file_.get(), 0644), 0);
-  EXPECT_EQ(may(kFirst, kFirst), "r");
-  ASSERT_TRUE(let({&kFirst, 1}, 6, 0640));
-  EXPECT_EQ(may(kFirst, kFirst), "rw");
-  EXPECT_EQ(may(kSecond, kSecond), "");
+  EXPECT_EQ(may(kFirstUser, kFirstUser), "r");
+  ASSERT_TRUE(let({&kFirstUser, 1}, 6, 0640));
+  EXPECT_EQ(may(kFirstUser, kFirstUser), "rw");
+  EXPECT_EQ(may(kSecondUser, kSecondUser), "");
 }
 
 TEST_F(AccessList, IsTheOwnersToGive) {
   EXPECT_EQ(in_a_child([&] {
-              if (::setresuid(kFirst, kFirst, kFirst) != 0) return std::string("no user");
-              const auto done = let({&kSecond, 1}, 6, 0640);
+              if (::setresuid(kFirstUser, kFirstUser, kFirstUser) != 0) return std::string("no user");
+              const auto done = let({&kSecondUser, 1}, 6, 0640);
               return done ? std::string("done") : std::string(to_string(done.error().code));
             }),
             to_string(ErrorCode::refused));
