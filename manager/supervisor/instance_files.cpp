@@ -63,6 +63,21 @@ void hand_over_all(const std::vector<std::string>& paths, const std::string& ins
   }
 }
 
+// Anybody may make files beside it, so it is believed only as that of an instance.
+void hand_over_retain_memory(const LeftFiles& left, const UserAccount& user) {
+  const std::string path = MemoryFile::path(pool_memory_name(left.pool, retain_memory_name(left.instance)));
+  const auto complain = [&](const Result<void>& done) {
+    if (!done) spdlog::error("instance {}: {}", left.instance, done.error().describe());
+  };
+  complain(take_away(path + ".new"));
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return;
+  if (plain_file(path) && is_trusted_owner(status.st_uid)) return hand_over_all({path}, left.instance, user);
+  spdlog::warn("{} was put there by another user ({}); it is removed and not used", path,
+               describe_rights(status.st_uid, status.st_gid, status.st_mode));
+  complain(take_away(path));
+}
+
 UserAccount account_of(const InstanceUser& user) {
   return user.value_or(UserAccount{.number = ::geteuid(), .group = ::getegid(), .groups = {}});
 }
@@ -130,19 +145,20 @@ void hand_over_files(const LeftFiles& left, const InstanceUser& user) {
   const UserAccount account = account_of(user);
   const std::string stem = left.run_directory + "/" + left.instance;
   const std::string claim = stem + ".claim";
-  const auto claimed = plain_file(claim);
-  if (claimed && claimed->st_uid != account.number && is_held(claim, *claimed)) {
-    spdlog::error("instance {}: a process of user {} has its name", left.instance, claimed->st_uid);
-    return;
+  // The other one also tells of a process with another run directory.
+  for (const std::string& held : {claim, MemoryFile::path(instance_claim_name(left.pool, left.instance))}) {
+    const auto claimed = plain_file(held);
+    if (!claimed || claimed->st_uid == account.number || !is_held(held, *claimed)) continue;
+    return spdlog::error("instance {}: a process of user {} has its name", left.instance, claimed->st_uid);
   }
   for (const std::string& path : {claim, instance_socket_path(left.run_directory, left.instance),
                                   values_socket_path(left.run_directory, left.instance)}) {
     if (is_there_of_another(path, account.number)) ::unlink(path.c_str());
   }
   hand_over_all({exception_path(left.run_directory, left.instance),
-                 kept_settings_path(left.run_directory, left.instance), stem + ".events",
-                 MemoryFile::path(pool_memory_name(left.pool, retain_memory_name(left.instance)))},
+                 kept_settings_path(left.run_directory, left.instance), stem + ".events"},
                 left.instance, account);
+  hand_over_retain_memory(left, account);
   remove_pages_of_others(left, account.number);
 }
 

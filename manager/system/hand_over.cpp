@@ -11,6 +11,7 @@
 
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/files/replace_file.hpp"
 
 namespace plchost {
@@ -75,7 +76,7 @@ Result<void> hand_over(const std::string& path, const UserAccount& user) {
   if (!before || before->st_uid == user.number) return {};
   PLCHOST_TRY_ASSIGN(const auto text, read_as_owner(path, *before));
   const std::string fresh = path + ".new";
-  ::unlink(fresh.c_str());
+  PLCHOST_TRY(take_away(fresh));
   auto written = write_as(user, fresh, text);
   if (written) written = give_group(user, fresh, *before);
   if (written && ::rename(fresh.c_str(), path.c_str()) != 0)

@@ -60,9 +60,25 @@ List list_now(int fd) {
   return list;
 }
 
-bool has_bits(int fd, mode_t mode) {
+mode_t bits_now(int fd) {
   struct stat status{};
-  return ::fstat(fd, &status) == 0 && (status.st_mode & kBits) == mode;
+  return ::fstat(fd, &status) == 0 ? status.st_mode & kBits : 0;
+}
+
+bool has_bits(int fd, mode_t mode, mode_t which = kBits) {
+  return ((bits_now(fd) ^ mode) & which) == 0;
+}
+
+bool is_ours(int fd) {
+  struct stat status{};
+  return ::fstat(fd, &status) == 0 && (::geteuid() == 0 || status.st_uid == ::geteuid());
+}
+
+Result<void> set_bits(int fd, mode_t mode, const std::string& path) {
+  if (::fchmod(fd, mode) == 0) return {};
+  const int error = errno;
+  return failure(error == EPERM ? ErrorCode::refused : ErrorCode::system, "cannot set the rights of " + path,
+                 error);
 }
 
 Result<void> take_list_away(int fd, const std::string& path) {
@@ -77,16 +93,15 @@ Result<void> let_users(int fd, std::span<const uid_t> users, mode_t rights, mode
   const List wanted = users.empty() ? List() : list_of(std::vector(users.begin(), users.end()), rights, mode);
   const mode_t shown = users.empty() ? mode : mode | (rights & kAll) << 3U;
   if (list_now(fd) == wanted && has_bits(fd, shown)) return {};
-  if (users.empty()) PLCHOST_TRY(take_list_away(fd, path));
-  // With a list these bits are the most that it allows, so nobody has more than before or after.
-  if (::fchmod(fd, mode) != 0) {
-    const int error = errno;
-    return failure(error == EPERM ? ErrorCode::refused : ErrorCode::system,
-                   "cannot set the rights of " + path, error);
+  if (users.empty()) {
+    PLCHOST_TRY(take_list_away(fd, path));
+    return set_bits(fd, mode, path);
   }
-  if (users.empty() || ::fsetxattr(fd, kAccess, wanted.data(), wanted.size(), 0) == 0) return {};
+  // The list brings all bits but this one. None is taken away before: who has rights may be using them.
+  if (!has_bits(fd, mode, S_ISVTX)) PLCHOST_TRY(set_bits(fd, bits_now(fd) ^ S_ISVTX, path));
+  if (::fsetxattr(fd, kAccess, wanted.data(), wanted.size(), 0) == 0) return {};
   const int error = errno;
-  return failure(error == EOPNOTSUPP ? ErrorCode::unsupported : ErrorCode::system,
+  return failure(error == EPERM && !is_ours(fd) ? ErrorCode::refused : ErrorCode::unsupported,
                  "cannot give users rights to " + path, error);
 }
 

@@ -309,11 +309,18 @@ Result<void> DebugConsole::go_on(std::string_view verb, const std::string& rest)
     task = "*";
   }
   PLCHOST_TRY(look());
-  passed_ = news_.told();
+  pass_halts_of(task);
   PLCHOST_TRY_ASSIGN(const auto answer, link_.command(verb == "until" ? fmt::format("until {} {}", task, rest)
                                                                       : fmt::format("{} {}", verb, task)));
   if (const std::string remark = answer.value("remark", ""); !remark.empty()) print_line(remark);
   return steps ? wait_for_halt(task, kStepPatience) : Result<void>();
+}
+
+// Those of other tasks are still to be waited for.
+void DebugConsole::pass_halts_of(const std::string& task) {
+  for (const auto& [name, halts] : news_.told()) {
+    if (task == "*" || task == name) passed_[name] = halts;
+  }
 }
 
 Result<void> DebugConsole::wait(const std::string& seconds) {
@@ -340,7 +347,7 @@ Result<void> DebugConsole::wait_for_halt(const std::string& task, Duration patie
              (known == passed_.end() || known->second != entry.second);
     });
     if (halted) {
-      passed_ = news_.told();
+      pass_halts_of(task.empty() ? "*" : task);
       return {};
     }
     if (MonotonicClock::now() >= end || interrupted()) {

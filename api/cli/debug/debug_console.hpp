@@ -40,6 +40,7 @@ class DebugConsole {
   [[nodiscard]] Result<void> set(const std::string& order);
   [[nodiscard]] Result<void> go_on(std::string_view verb, const std::string& rest);
   [[nodiscard]] Result<void> wait(const std::string& seconds);
+  void pass_halts_of(const std::string& task);
   [[nodiscard]] Result<void> wait_for_halt(const std::string& task, Duration patience);
   [[nodiscard]] Result<void> choose(const std::string& task);
   [[nodiscard]] Result<std::string> task_or_current(const std::string& named);

@@ -2,14 +2,23 @@
 
 #include <utility>
 
+#include <sys/stat.h>
+
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 
 namespace {
 
 constexpr Duration kRingRetry = std::chrono::milliseconds(100);
+
+ino_t file_of(const std::string& pool, const std::string& instance) {
+  struct stat status{};
+  return ::stat(MemoryFile::path(transition_ring_name(pool, instance)).c_str(), &status) == 0 ? status.st_ino
+                                                                                              : 0;
+}
 
 }  // namespace
 
@@ -29,17 +38,23 @@ void TransitionPublisher::follow(const std::string& instance, Followed& followed
   if (!followed.ring) {
     if (now < followed.next_look) return;
     followed.next_look = now + kRingRetry;
+    followed.file = file_of(source_.pool, instance);
     auto opened = TransitionRingReader::open(source_.pool, instance);
     if (!opened) return;
     followed.ring = *std::move(opened);
   }
   for (;;) {
     if (!followed.unsent) followed.unsent = followed.ring->next(now);
-    if (!followed.unsent) return;
+    if (!followed.unsent) break;
     if (!write(instance, followed.ring->stream_unix_ns(), *followed.unsent)) return;
     followed.written = followed.unsent->sequence;
     followed.unsent.reset();
   }
+  // The manager makes a damaged ring anew, and all write into that.
+  if (now < followed.next_look) return;
+  followed.next_look = now + kRingRetry;
+  const ino_t file = file_of(source_.pool, instance);
+  if (file != 0 && file != followed.file) followed.ring.reset();
 }
 
 bool TransitionPublisher::write(const std::string& instance, std::int64_t stream,

@@ -6,6 +6,7 @@
 #include <string>
 
 #include <control.h>
+#include <sys/types.h>
 
 #include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
@@ -34,7 +35,8 @@ class TransitionPublisher {
  private:
   struct Followed {
     std::optional<TransitionRingReader> ring;
-    TimePoint next_look;               // for the ring, while there is none
+    ino_t file = 0;                    // that has the ring
+    TimePoint next_look;               // for the ring, or for another one
     std::optional<Transition> unsent;  // that DDS did not take
     std::uint64_t written = 0;         // the last number
   };

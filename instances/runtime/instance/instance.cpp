@@ -317,8 +317,10 @@ void Instance::report_clock(ClockRuntime& clock) {
   const std::string_view silence =
       reference_ && reference_->problem().empty() ? clock.problem.view() : std::string_view();
   if (silence == clock_silence_) return;
-  if (!silence.empty()) spdlog::warn("{}; the grids go on without it", silence);
-  if (silence.empty() && clock.state != 0) spdlog::info("the reference clock is followed again");
+  // Once for each silence, whatever its reasons are.
+  if (!silence.empty() && clock_silence_.empty()) spdlog::warn("{}; the grids go on without it", silence);
+  if (silence.empty() && clock.state != 0 && clock.problem.view().empty())
+    spdlog::info("the reference clock is followed again");
   clock_silence_ = silence;
 }
 

@@ -16,6 +16,7 @@
 namespace plchost {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 
 /// Instance, number and reason of each that has come, until `count` of them are there.
@@ -114,6 +115,23 @@ TEST(RemoteTransitions, ComeEachOnceAndInOrderOverAllEndsOfTheServer) {
   }
   EXPECT_THAT(sut.of("line1"), ElementsAreArray(script.expected(0)));
   EXPECT_THAT(sut.of("line2"), ElementsAreArray(script.expected(1)));
+}
+
+// The manager makes a ring anew that a stranger has damaged or taken away.
+TEST(RemoteTransitions, ComeFromTheRingThatTakesThePlaceOfAnother) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  Script script(host);
+  script.add(0, "before");
+  host.start_server();
+  Witness sut(domain);
+  sut.look_until(1);
+  TransitionRing::remove(host.pool_name(), "line1");
+  auto fresh = TransitionRing::open(host.pool_name(), "line1");
+  ASSERT_TRUE(fresh);
+  fresh->add(TransitionSource::application, 1, 2, 100, "behind");
+  sut.look_until(2);
+  EXPECT_THAT(sut.of("line1"), ElementsAre("line1 1 before", "line1 1 behind"));
 }
 
 TEST(RemoteTransitions, AreCompleteWhenTheHostSaysSoAndNotBefore) {

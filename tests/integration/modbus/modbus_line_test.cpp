@@ -235,6 +235,22 @@ INSTANTIATE_TEST_SUITE_P(Each, ModbusLateDevice,
                                            Lateness{1, 1}, Lateness{2, 1}, Lateness{3, 1}));
 
 // Two processes at one line would take each other's responses.
+// Others wait for their turn meanwhile.
+TEST(ModbusLine, ADeviceThatRefusesAllIsAskedOnceInEachPoll) {
+  constexpr std::chrono::milliseconds kPoll{20};
+  Plant plant;
+  const SerialLine line;
+  ModbusPeer peer(line, 1);
+  peer.set(ModbusPeer::Mode::refuses);
+  const ModbusProgram sut(plant, plant.write(two_reads(line, peer, 2)));
+  ASSERT_TRUE(eventually([&] { return quality_is(plant, 40, Quality::exception); })) << sut.log();
+  const TimePoint begin = MonotonicClock::now();
+  const int before = peer.requests();
+  ASSERT_TRUE(eventually([&] { return peer.requests() > before + 30; })) << sut.log();
+  const int requests = peer.requests() - before;
+  EXPECT_LE(requests, (MonotonicClock::now() - begin) / kPoll + 2);
+}
+
 TEST(ModbusLine, ALineHasOneProcess) {
   Plant plant;
   Plant other;

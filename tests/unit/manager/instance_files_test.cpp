@@ -144,6 +144,7 @@ TEST_F(InstanceFiles, OfRetainVariablesInMemoryAreHandedOverBothWays) {
   ASSERT_TRUE(MemoryFile::create(memory, 64, fill, {.group = kPools, .mode = 0660}));
   const std::string text(64, '\7');
   const auto shown = [&](uid_t owner) { return fmt::format("{} 0660 {}", owner, text); };
+  ASSERT_TRUE(trust_instances_of(kUser));
   hand_over_files(left_, kAccount);
   EXPECT_EQ(look(path), shown(kUser));
   struct stat status{};
@@ -152,6 +153,24 @@ TEST_F(InstanceFiles, OfRetainVariablesInMemoryAreHandedOverBothWays) {
   hand_over_files(left_, std::nullopt);
   EXPECT_EQ(look(path), shown(0));
   EXPECT_FALSE(fs::exists(path.string() + ".new"));
+  MemoryFile::remove(memory);
+}
+
+// Anybody may make files in /dev/shm, and a PLC would begin with these values.
+TEST_F(InstanceFiles, OfRetainVariablesInMemoryAreNotThoseOfAStranger) {
+  constexpr uid_t kStranger = 64099;
+  const std::string memory = pool_memory_name(left_.pool, "line1.retain");
+  const fs::path path = MemoryFile::path(memory);
+  std::ofstream(path) << "planted";
+  ASSERT_EQ(::chown(path.c_str(), kStranger, kStranger), 0);
+  fs::permissions(path, fs::perms(0666));
+  hand_over_files(left_, kAccount);
+  EXPECT_FALSE(fs::exists(path));
+  fs::create_directory(path.string() + ".new");
+  std::ofstream(path) << "the manager's";
+  fs::permissions(path, fs::perms(0640));
+  hand_over_files(left_, kAccount);
+  EXPECT_EQ(look(path), fmt::format("{} 0640 the manager's", kUser)) << "nothing is in the way";
   MemoryFile::remove(memory);
 }
 

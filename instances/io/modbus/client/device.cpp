@@ -152,7 +152,8 @@ LinkResult Device::tell_apart(const RegisterMap& map) {
     MapValues ignored;
     auto read = link_.read(config_, *other, ignored);
     note(read_shape(*other), read);
-    if (read || read.error().exception != 0) continue;
+    if (read) continue;
+    // Also if it was refused: a device that refuses all would be asked again and again, and others wait.
     read.error().text +=
         fmt::format(", when it was asked for {} from address {} to tell late responses apart", other->count,
                     other->address);
@@ -167,7 +168,7 @@ void Device::note(ResponseShape shape, const LinkResult& result) {
     unanswered_.answered(shape);
   } else if (result.error().exception != 0) {
     unanswered_.refused(shape);
-  } else if (!result.error().not_asked) {
+  } else if (!result.error().not_asked && !result.error().not_sent) {
     unanswered_.given_up(shape);
   }
 }

@@ -149,7 +149,11 @@ bool Link::await_line(TimePoint deadline, Limits limits) {
 }
 
 std::expected<Pdu, LinkFailure> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
-  if (auto opened = open_line(device); !opened) return without_answer(std::move(opened).error());
+  if (auto opened = open_line(device); !opened) {
+    auto failure = without_answer(std::move(opened).error());
+    failure.error().not_sent = true;
+    return failure;
+  }
   modbus_t* const line = line_.get();
   modbus_set_slave(line, device.unit);
   modbus_flush(line);  // a late response of somebody else

@@ -18,6 +18,7 @@ namespace plchost::modbus {
 struct LinkFailure {
   std::uint8_t exception = 0;  ///< the code of the device; 0: no answer, or garbage
   std::string text;
+  bool not_sent = false;   ///< the line is not open
   bool not_asked = false;  ///< this process ends: nothing was sent, nothing is known of the device
   bool at_rest = false;    ///< the connection had ended before the response began
 };
