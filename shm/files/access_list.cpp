@@ -97,7 +97,7 @@ Result<void> let_users(int fd, std::span<const uid_t> users, mode_t rights, mode
     PLCHOST_TRY(take_list_away(fd, path));
     return set_bits(fd, mode, path);
   }
-  // The list brings all bits but this one. None is taken away before: who has rights may be using them.
+  // The list brings all bits but this one. None is taken away before: instances may be using them.
   if (!has_bits(fd, mode, S_ISVTX)) PLCHOST_TRY(set_bits(fd, bits_now(fd) ^ S_ISVTX, path));
   if (::fsetxattr(fd, kAccess, wanted.data(), wanted.size(), 0) == 0) return {};
   const int error = errno;
