@@ -43,8 +43,11 @@ class MatiecTranslator : public Translator {
     std::ranges::move(matiec::refused_words(context_.sources), std::back_inserter(context_.report.problems));
     std::ranges::move(matiec::refused_names(context_.project), std::back_inserter(context_.report.problems));
     if (context_.good()) {
-      std::ranges::move(matiec::refused_pous(context_.project, context_.sources),
-                        std::back_inserter(context_.report.problems));
+      // A block of methods only has no variables either.
+      auto refused = matiec::refused_pous(context_.project, context_.sources);
+      if (!refused.empty())
+        refused = matiec::explained(std::move(refused), context_.sources, context_.project);
+      std::ranges::move(refused, std::back_inserter(context_.report.problems));
     }
     if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
     // Errors of the sources count more than a configuration that is missing.
