@@ -33,7 +33,7 @@ std::string process_text(pid_t pid) {
   if (pid <= 0) return "another process";
   std::ifstream file(fmt::format("/proc/{}/cmdline", pid), std::ios::binary);
   std::string line{std::istreambuf_iterator<char>(file), {}};
-  const std::size_t program = std::string_view(line.c_str()).rfind('/');
+  const std::size_t program = line.rfind('/', line.find('\0'));  // not those of its arguments
   if (program != std::string::npos) line.erase(0, program + 1);
   while (line.ends_with('\0')) line.pop_back();
   std::ranges::replace(line, '\0', ' ');
