@@ -12,6 +12,7 @@
 #include <linux/posix_acl_xattr.h>
 #include <sys/stat.h>
 #include <sys/xattr.h>
+#include <unistd.h>
 
 #include "shm/base/system_call.hpp"
 
