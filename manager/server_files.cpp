@@ -90,14 +90,9 @@ void hand_over_ledger(const std::string& pool, const std::optional<UserAccount>&
   const UserAccount user =
       server.value_or(UserAccount{.number = ::geteuid(), .group = ::getegid(), .groups = {}});
   const std::string path = MemoryFile::path(fmt::format("{}.posts", pool));
-  struct stat status{};
-  if (::lstat(path.c_str(), &status) != 0) return;
-  const bool believed = plain_file(path) && (status.st_uid == user.number || status.st_uid == ::geteuid());
-  const auto done = believed ? hand_over(path, user) : take_away(path);
-  if (!done) return spdlog::error("the API server may lack a file: {}", done.error().describe());
-  if (believed) return;
-  spdlog::warn("{} was put there by another user ({}); it is removed and not used", path,
-               describe_rights(status.st_uid, status.st_gid, status.st_mode));
+  const auto done = hand_over_believed(
+      path, user, [&user](uid_t owner) { return owner == user.number || owner == ::geteuid(); });
+  if (!done) spdlog::error("the API server may lack a file: {}", done.error().describe());
 }
 
 Result<void> keep_folder(const std::string& path) {

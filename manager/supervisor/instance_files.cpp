@@ -53,29 +53,21 @@ bool is_held(const std::string& path, const struct stat& status) {
   return fd && ::fcntl(fd.get(), F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
 }
 
+void tell_lack(const std::string& instance, const UserAccount& user, const Result<void>& done) {
+  if (done) return;
+  spdlog::error("instance {}: user {} may lack a file: {}", instance, user.number, done.error().describe());
+}
+
 void hand_over_all(const std::vector<std::string>& paths, const std::string& instance,
                    const UserAccount& user) {
-  for (const std::string& path : paths) {
-    const auto done = hand_over(path, user);
-    if (!done)
-      spdlog::error("instance {}: user {} may lack a file: {}", instance, user.number,
-                    done.error().describe());
-  }
+  for (const std::string& path : paths) tell_lack(instance, user, hand_over(path, user));
 }
 
 // Anybody may make files beside it, so it is believed only as that of an instance.
 void hand_over_retain_memory(const LeftFiles& left, const UserAccount& user) {
   const std::string path = MemoryFile::path(pool_memory_name(left.pool, retain_memory_name(left.instance)));
-  const auto complain = [&](const Result<void>& done) {
-    if (!done) spdlog::error("instance {}: {}", left.instance, done.error().describe());
-  };
-  complain(take_away(path + ".new"));
-  struct stat status{};
-  if (::lstat(path.c_str(), &status) != 0) return;
-  if (plain_file(path) && is_trusted_owner(status.st_uid)) return hand_over_all({path}, left.instance, user);
-  spdlog::warn("{} was put there by another user ({}); it is removed and not used", path,
-               describe_rights(status.st_uid, status.st_gid, status.st_mode));
-  complain(take_away(path));
+  tell_lack(left.instance, user, take_away(path + ".new"));
+  tell_lack(left.instance, user, hand_over_believed(path, user, is_trusted_owner));
 }
 
 UserAccount account_of(const InstanceUser& user) {

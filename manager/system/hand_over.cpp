@@ -13,6 +13,7 @@
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/replace_file.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 
@@ -83,6 +84,17 @@ Result<void> hand_over(const std::string& path, const UserAccount& user) {
     written = failure(ErrorCode::system, "cannot rename " + fresh, errno);
   if (!written) ::unlink(fresh.c_str());
   return written;
+}
+
+Result<void> hand_over_believed(const std::string& path, const UserAccount& user,
+                                const OwnerCheck& believed) {
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return {};
+  if (plain_file(path) && believed(status.st_uid)) return hand_over(path, user);
+  PLCHOST_TRY(take_away(path));
+  spdlog::warn("{} was put there by another user ({}); it is removed and not used", path,
+               describe_rights(status.st_uid, status.st_gid, status.st_mode));
+  return {};
 }
 
 }  // namespace plchost

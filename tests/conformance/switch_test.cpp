@@ -147,16 +147,22 @@ TEST(SwitchOfRunningTasks, NeedsRunningTasks) {
   EXPECT_EQ(tasks.set->start("CmpSchedule", {}).error().code, ErrorCode::wrong_state);
 }
 
-TEST(SwitchOfRunningTasks, TellsWhichTasksRunAndWhichAreParked) {
-  LinuxClock clock;
-  TaskStatistics statistics{};
-  std::vector<bool> told;
+/// A task "main" of 1 ms. Each change of its state goes into `told`.
+Result<std::unique_ptr<TaskSet>> main_that_tells(Clock& clock, TaskStatistics& statistics,
+                                                 std::vector<bool>& told) {
   TaskEnvironment environment;
   environment.allow_unprivileged = true;
   environment.statistics = [&](std::size_t) -> TaskStatistics& { return statistics; };
   environment.state_changed = [&](std::size_t, bool running) { told.push_back(running); };
-  auto set = TaskSet::create(clock, PriorityBand::low, {ManualTasks::cyclic("main", milliseconds(1), [] {})},
-                             environment);
+  return TaskSet::create(clock, PriorityBand::low, {ManualTasks::cyclic("main", milliseconds(1), [] {})},
+                         environment);
+}
+
+TEST(SwitchOfRunningTasks, TellsWhichTasksRunAndWhichAreParked) {
+  LinuxClock clock;
+  std::vector<bool> told;
+  TaskStatistics statistics{};
+  const auto set = main_that_tells(clock, statistics, told);
   ASSERT_TRUE(set);
   ASSERT_TRUE((*set)->start("CmpSchedule", {}));
   EXPECT_THAT((*set)->still_busy(MonotonicClock::now() + seconds(30)), testing::IsEmpty());
@@ -194,14 +200,9 @@ class HeldClock final : public Clock {
 
 TEST(SwitchOfRunningTasks, TellsThatATaskRunsIfItsThreadGetsNoCoreAtTheStart) {
   HeldClock clock;
-  TaskStatistics statistics{};
   std::vector<bool> told;
-  TaskEnvironment environment;
-  environment.allow_unprivileged = true;
-  environment.statistics = [&](std::size_t) -> TaskStatistics& { return statistics; };
-  environment.state_changed = [&](std::size_t, bool running) { told.push_back(running); };
-  auto set = TaskSet::create(clock, PriorityBand::low, {ManualTasks::cyclic("main", milliseconds(1), [] {})},
-                             environment);
+  TaskStatistics statistics{};
+  const auto set = main_that_tells(clock, statistics, told);
   ASSERT_TRUE(set);
   clock.held = true;
   while (!clock.sleeps) std::this_thread::sleep_for(milliseconds(1));
