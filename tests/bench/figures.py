@@ -11,7 +11,7 @@ import json
 import statistics
 import sys
 
-UNITS = [("_us_per_cycle", "us"), ("_us_per_activation", "us"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"),
+UNITS = [("_us_per_cycle", "us"), ("_ns_per_cycle", "ns"), ("_us_per_activation", "us"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"),
          ("gb_s", "GB/s"), ("_mib", "MiB"), ("_per_second", "per second"), ("_per_million", "per million"), ("_per_cycle", "per cycle"),
          ("_per_stall", "per stall"), ("_percent", "%"), ("_ppb", "ppb"), ("share_of_core", "share of a core"),
          ("load", "share of a core"), ("share", "share of a core")]
