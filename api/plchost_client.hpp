@@ -1,7 +1,8 @@
 // The client library of plchost: sees and commands PLC hosts from anywhere over DDS, by api/control.idl.
 //
-//     #include <plchost/plchost_client.hpp>                  g++ x.cpp $(pkg-config --cflags --libs
-//     plchost-client)
+// g++ -std=c++20 x.cpp $(pkg-config --cflags --libs plchost-client)
+//
+//     #include <plchost/plchost_client.hpp>
 //
 //     int main() {
 //       plchost::Client client;
@@ -198,7 +199,7 @@ class PLCHOST_CLIENT_API Client {
     std::string name;              ///< "set scheduler"
     std::string argument;          ///< "scheduler", "event", "path", "task"; empty: it takes none
     bool may_be_left_out = false;  ///< the argument
-    std::string help;              ///< empty for a few
+    std::string help;              ///< one sentence
     bool names_instance = false;   ///< else it is for the whole host
     bool engineering = false;      ///< for engineers; others are for operators, too
     bool loads = false;            ///< LoadOptions count

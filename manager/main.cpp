@@ -22,6 +22,7 @@
 #include "shm/base/names.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
+#include "shm/log/log_levels.hpp"
 
 namespace plchost {
 
@@ -45,8 +46,8 @@ void describe(CLI::App& app, Options& options) {
                                "Only check this configuration file, and all that a start needs");
   config->excludes(check);
   app.add_option("--log-level", options.log_level,
-                 "Instead of the file's: trace, debug, info, warning, error")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
+                 fmt::format("Instead of the file's: {}", join_names(kLogLevels)))
+      ->check(CLI::IsMember(std::vector<std::string>(kLogLevels.begin(), kLogLevels.end())));
   app.add_option("--programs", options.programs,
                  "Folder of plc-instance and plchost-dds; default: that of plchostd");
   std::string footer =

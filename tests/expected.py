@@ -37,7 +37,11 @@ class Expected:
 
     def second_run(self, name):
         """Why it may run again, by tests/retries.txt; None: that does not name it."""
-        return self.reason(name, "time")
+        return self.reason(name, "time", "slow")
+
+    def is_slow(self, name):
+        """Whether it may run again only because every program of this build is slow."""
+        return self.second_run(name) is not None and self.reason(name, "time") is None
 
     def may_stall(self, name):
         """Whether it may run again, by tests/retries.txt, if the machine stood still while it ran (stalls.py)."""

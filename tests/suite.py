@@ -33,6 +33,7 @@ FURTHER_ROUND = re.compile(r"^further round: (\S+): (.*)$", re.MULTILINE)
 ONE_CASE = "--gtest_filter="
 PROGRAM = re.compile(r"TEST_EXECUTABLE \[==\[(.*?)\]==\]")  # in what gtest_discover_tests writes
 COSTLY = 20  # tests named with their processor time
+SLOW = 3  # second runs in a build whose programs are all slow
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -234,6 +235,10 @@ def run(suite):
     for name in too_many:
         print(f"FAILED: {name}: the machine stood still for {milliseconds(stalled[name])} while it ran, and while {len(stalled) - 1} others "
               f"that failed ran: at most {STALLED} may run again")
+    slow = [name for name in named["retried"] if name not in stalled and retries.is_slow(name)]
+    too_slow = slow if len(slow) > SLOW else []
+    for name in too_slow:
+        print(f"FAILED: {name}: a second run, as were {len(slow) - 1} others: of those that only a slow build excuses, at most {SLOW}")
     unlisted = [name for name, _ in suite.rounds if retries.reason(name, "rounds") is None]
     for name, what in suite.rounds:
         print(f"further round: {name}: {what}: {retries.reason(name, 'rounds') or 'NOT EXPECTED (tests/retries.txt)'}")
@@ -254,7 +259,7 @@ def run(suite):
         print(f"FAILED: {place}: no test matches {pattern}: remove the line, or name the test as it is called")
     suite.print_costly()
     print(f"stalls: {kind}: {suite.stalls.summary()}")
-    failed = {*named["failed"], *unexpected, *unlisted, *too_many, *not_left_out, *wrongly_listed, *of_no_test}
+    failed = {*named["failed"], *unexpected, *unlisted, *too_many, *too_slow, *not_left_out, *wrongly_listed, *of_no_test}
     passed = {name for name, result in results.items() if result in ("passed", "retried")} - failed
     print(f"{len(passed)} passed, {len(failed)} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")

@@ -25,6 +25,7 @@
 #include "api/cli/words/short_form.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/host_words.hpp"
 
 namespace {
 
@@ -53,7 +54,7 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--domain", options.dds.domain, "DDS domain (default 0)")
       ->envname("PLCHOST_DOMAIN")
-      ->check(CLI::Range(0U, plchost::dds::kMaxDomain))
+      ->check(CLI::Range(0U, plchost::kMaxDdsDomain))
       ->take_last();
   constexpr double kMinTimeout = 0.1;
   constexpr double kMaxTimeout = 3600;

@@ -9,12 +9,14 @@
 
 #include <fmt/format.h>
 
+#include "shm/pages/host_words.hpp"
+
 namespace plchost {
 
 namespace {
 
 /// The most that [host] application_limit_mib can allow.
-constexpr std::uintmax_t kLargest = std::uintmax_t{1024} << 20U;
+constexpr std::uintmax_t kLargest = std::uintmax_t{kMaxApplicationMib} << 20U;
 
 }  // namespace
 

@@ -30,6 +30,7 @@
 #include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/pages/host_words.hpp"
 
 namespace plchost::dds {
 
@@ -113,9 +114,9 @@ Result<void> filter_datagrams(const Entity& participant, std::string_view what) 
 }  // namespace
 
 Result<std::string> domain_configuration(Role role, const DomainOptions& options) {
-  if (options.domain > kMaxDomain) {
+  if (options.domain > kMaxDdsDomain) {
     return failure(ErrorCode::invalid_argument,
-                   fmt::format("domain {} is not valid: allowed are 0 to {}", options.domain, kMaxDomain));
+                   fmt::format("domain {} is not valid: allowed are 0 to {}", options.domain, kMaxDdsDomain));
   }
   std::string interfaces;
   bool loopback = false;

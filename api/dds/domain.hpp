@@ -11,9 +11,6 @@
 
 namespace plchost::dds {
 
-/// Domains have UDP ports of their own: 7400 + 250 x domain must stay below 65536.
-inline constexpr std::uint32_t kMaxDomain = 230;
-
 /// The greatest number of servers in one domain on one machine. Each takes the first free one of these port
 /// pairs; clients have no fixed port and look at all of them, so that any number of clients can come.
 inline constexpr int kMaxServersPerMachine = 16;

@@ -10,9 +10,12 @@
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/heap_trim.hpp"
+#include "shm/base/names.hpp"
 #include "shm/files/memory_rights.hpp"
 #include "shm/guard/memory_guard.hpp"
 #include "shm/log/log.hpp"
+#include "shm/log/log_levels.hpp"
+#include "shm/pages/host_words.hpp"
 #include "shm/process/end_with_parent.hpp"
 
 namespace {
@@ -42,8 +45,7 @@ int main(int argc, char** argv) {
   CLI::App app("plchost-dds: the API server of plchost, started by plchostd");
   app.set_version_flag("--version", PLCHOST_VERSION);
   app.add_option("--host", options.host, "name of this host in the DDS domain")->required();
-  app.add_option("--domain", options.dds.domain, "DDS domain")
-      ->check(CLI::Range(0U, plchost::dds::kMaxDomain));
+  app.add_option("--domain", options.dds.domain, "DDS domain")->check(CLI::Range(0U, plchost::kMaxDdsDomain));
   app.add_option("--pool", options.pool, "name of the object pool");
   app.add_option("--run-directory", options.run_directory, "where the manager's socket is")->required();
   app.add_option("--interface", options.dds.interfaces, "network interfaces (default: lo)");
@@ -56,14 +58,17 @@ int main(int argc, char** argv) {
                  "number of this host for blocks between hosts; 0: none")
       ->check(CLI::Range(std::uint16_t{0}, plchost::kMaxHostNumber));
   app.add_option("--blocks-base", options.blocks_base, "base name of the nodes that send blocks");
-  const auto role = [&app](const char* option, plchost::security::Role& target, const char* help) {
+  const auto role = [&app](const char* option, plchost::security::Role& target, const auto& words,
+                           const char* help) {
     app.add_option_function<std::string>(
            option,
            [&target](const std::string& word) { target = plchost::security::parse_role(word).value(); }, help)
-        ->check(CLI::IsMember({"viewer", "operator", "engineer"}));
+        ->check(CLI::IsMember(std::vector<std::string>(words.begin(), words.end())));
   };
-  role("--read-variables", options.variable_rights.read, "the role that reads variables of a secured host");
-  role("--write-variables", options.variable_rights.write, "the role that writes and forces them");
+  role("--read-variables", options.variable_rights.read, plchost::kReaderRoles,
+       "the role that reads variables of a secured host");
+  role("--write-variables", options.variable_rights.write, plchost::kWriterRoles,
+       "the role that writes and forces them");
   app.add_option("--label", options.labels, "by which clients choose hosts");
   app.add_option("--audit-folder", options.audit_folder, "folder of the log of changes by clients");
   app.add_option("--name-since", options.name_since_ns,
@@ -77,14 +82,15 @@ int main(int argc, char** argv) {
   app.add_option("--applications-folder", options.applications_folder,
                  "where the manager keeps the applications that were sent");
   app.add_option("--application-limit", options.application_limit_mib, "the largest of them, MiB")
-      ->check(CLI::Range(1U, 1024U));
+      ->check(CLI::Range(1U, plchost::kMaxApplicationMib));
   app.add_option("--user", user,
                  "run as this user, with no other rights than the API needs (default: that of the caller)");
   app.add_option("--instance-user", instance_users, "numbers of the users that instances run as");
   app.add_option("--parent", parent, "be killed when this process ends, which has started this one")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
+  app.add_option("--log-level", log_level, plchost::join_names(plchost::kLogLevels))
+      ->check(
+          CLI::IsMember(std::vector<std::string>(plchost::kLogLevels.begin(), plchost::kLogLevels.end())));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -6,6 +6,7 @@
 #include "manager/config/config_kinds.hpp"
 #include "manager/config/config_table.hpp"
 #include "shm/log/log_levels.hpp"
+#include "shm/pages/host_words.hpp"
 
 namespace plchost {
 
@@ -14,13 +15,6 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 using enum TakesEffect;
-
-constexpr std::array kPriorityBands = {std::string_view("high"), std::string_view("normal"),
-                                       std::string_view("low")};
-
-constexpr std::array kReaders = {std::string_view("viewer"), std::string_view("operator"),
-                                 std::string_view("engineer")};
-constexpr std::array kWriters = {std::string_view("operator"), std::string_view("engineer")};
 
 template <auto Member, class Kind>
 constexpr auto host(const ConfigKey& key) {
@@ -121,12 +115,12 @@ constexpr std::array kHostKeys = {
                                                      .when = at_once,
                                                      .initial = "those not in `cores`, else all",
                                                      .meaning = "where manager and API server run"}),
-    host<&HostConfig::read_variables, WordKey<kReaders>>(
+    host<&HostConfig::read_variables, WordKey<kReaderRoles>>(
         {.name = "read_variables",
          .when = new_server,
          .meaning = "the least [role](../api/security.md) that reads [variables](../instances/variables.md) "
                     "of instances. Without `identity` everybody can"}),
-    host<&HostConfig::write_variables, WordKey<kWriters>>(
+    host<&HostConfig::write_variables, WordKey<kWriterRoles>>(
         {.name = "write_variables",
          .when = new_server,
          .meaning = "the least role that writes, forces and unforces variables"}),
@@ -214,7 +208,7 @@ constexpr std::array kInstanceKeys = {
          .when = next_process,
          .initial = "that of the settings (`[SysTimer] Linux.TimerMode`), else `CmpSchedule`",
          .meaning = "decides when a task is released"}),
-    instance<&InstanceConfig::priority_band, WordKey<kPriorityBands>>(
+    instance<&InstanceConfig::priority_band, WordKey<kPriorityBandNames>>(
         {.name = "priority_band",
          .when = next_process,
          .meaning = "the order of instances that share a core"}),

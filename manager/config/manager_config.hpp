@@ -86,13 +86,11 @@ struct ManagerConfig {
 inline constexpr std::size_t kMaxLabels = 4;  // the room in an entry of a sample
 inline constexpr std::size_t kMaxLabel = 30;
 inline constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 20;
-inline constexpr int kMaxDdsDomain = 230;  // its UDP ports must stay below 65536
 inline constexpr std::int64_t kMinPoolObjects = 16;
 inline constexpr std::int64_t kMaxPoolObjects = 1'000'000;
 inline constexpr std::size_t kMaxPoolName = 31;
 /// So that "RUN_DIRECTORY/NAME.sock" fits in the 107 characters of a socket path.
 inline constexpr std::size_t kMaxRunDirectory = 70;
-inline constexpr std::int64_t kMaxApplicationMib = 1024;
 inline constexpr std::int64_t kMaxApplicationVersions = 100;
 inline constexpr std::size_t kMaxPeers = 32;
 inline constexpr std::int64_t kMaxRestartDelayMs = 3'600'000;

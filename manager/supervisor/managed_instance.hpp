@@ -18,6 +18,7 @@
 #include "manager/supervisor/instance_phase.hpp"
 #include "manager/supervisor/restart_decision.hpp"
 #include "manager/supervisor/starvation_watch.hpp"
+#include "shm/base/stop_limits.hpp"
 #include "shm/pages/host_page.hpp"
 #include "shm/process/work_limit.hpp"
 
@@ -409,8 +410,7 @@ class ManagedInstance : public InstanceEvents {
 /// Limits of the phases; those of commands are in the rows of shm/operations/operations.def.
 inline constexpr Duration kSetupLimit = std::chrono::seconds(30);
 inline constexpr Duration kAdoptLimit = std::chrono::seconds(5);
-/// Longer than a stop may take: 10 s for tasks that drive outputs, 25 s for the others.
-inline constexpr Duration kShutdownLimit = std::chrono::seconds(38);
+inline constexpr Duration kShutdownLimit = kStopLimit;
 inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
 /// The process's page is believed only this long after its own answer: it is written periodically.
 inline constexpr Duration kPageLag = std::chrono::seconds(1);

@@ -21,6 +21,7 @@ namespace plchost {
 //      each new process.
 //   3. The manager restarts no instance that was removed from the configuration.
 //   4. When a manager begins, an instance that no operator has started or stopped follows `autostart`.
+//   5. `autostart` begins an instance with its host under each policy, also under `never`.
 //
 // An end that nobody asked this manager for is a crash, whatever the exit code: exit(0) in a cycle is one.
 // A set-up that failed is no crash. on_failure does not repeat it, because the same files would fail again.

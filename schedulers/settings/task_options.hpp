@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "shm/base/bounds.hpp"
+#include "shm/base/stop_limits.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -16,12 +18,13 @@ enum class WatchdogPolicy : std::uint8_t { application, task };
 struct TaskWatchdog {
   Duration time{};                ///< of one cycle; 0: no time watchdog of its own
   std::uint32_t sensitivity = 1;  ///< hits in a cycle that takes time * sensitivity, or in the n-th in a row
-                                  ///< that takes `time`; 1..kMaxWatchdogCount
+                                  ///< that takes `time`; kWatchdogSensitivity
   std::uint32_t omitted_cycles = 0;  ///< hits when this many releases in a row did not run; 0: off
   WatchdogPolicy policy = WatchdogPolicy::application;
   bool operator==(const TaskWatchdog&) const = default;
 };
 inline constexpr std::uint32_t kMaxWatchdogCount = 1'000'000;
+inline constexpr Bounds<std::uint32_t> kWatchdogSensitivity{.lowest = 1, .highest = kMaxWatchdogCount};
 /// 2^32 us, the range of the C interface.
 inline constexpr Duration kMaxWatchdogTime = std::chrono::microseconds(0xffff'ffff);
 
@@ -44,8 +47,8 @@ inline constexpr Duration kMinRuntimeInterval = std::chrono::microseconds(1);
 
 /// How long tasks may take to come to the end of their cycles, in each of the two phases of a stop.
 struct StopLimits {
-  Duration outputs = std::chrono::seconds(10);  ///< tasks that drive outputs; the others run on meanwhile
-  Duration others = std::chrono::seconds(25);
+  Duration outputs = kMaxStopOfOutputs;  ///< tasks that drive outputs; the others run on meanwhile
+  Duration others = kMaxStopOfOthers;
   bool operator==(const StopLimits&) const = default;
 };
 

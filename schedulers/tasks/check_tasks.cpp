@@ -41,8 +41,10 @@ Result<void> check_watchdog(const TaskConfig& task) {
                     fmt::format("its watchdog time must be 0 (off) to {} us",
                                 std::chrono::floor<std::chrono::microseconds>(kMaxWatchdogTime).count()));
   }
-  if (watchdog.sensitivity < 1 || watchdog.sensitivity > kMaxWatchdogCount) {
-    return bad_task(task, fmt::format("its watchdog sensitivity must be 1 to {}", kMaxWatchdogCount));
+  if (watchdog.sensitivity < kWatchdogSensitivity.lowest ||
+      watchdog.sensitivity > kWatchdogSensitivity.highest) {
+    return bad_task(task, fmt::format("its watchdog sensitivity must be {} to {}",
+                                      kWatchdogSensitivity.lowest, kWatchdogSensitivity.highest));
   }
   if (watchdog.omitted_cycles > kMaxWatchdogCount) {
     return bad_task(task, fmt::format("its omitted cycles must be 0 (off) to {}", kMaxWatchdogCount));

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
+#include "shm/base/stop_limits.hpp"
 
 namespace plchost {
 

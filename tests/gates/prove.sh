@@ -459,6 +459,14 @@ must_be_red "suite: skipped and not listed" "skipped: Planted.Skip: NOT EXPECTED
 must_be_red "suite: skipped and listed for another kind" "skipped: Planted.Skip: NOT EXPECTED" suite "thread Planted.Skip planted" "$round"
 must_be_red "suite: further round and not listed" "further round: Planted.Round: a core stood still: NOT EXPECTED (tests/retries.txt)" suite "$skip" ""
 must_be_red "suite: further round and listed as a second run" "a core stood still: NOT EXPECTED" suite "$skip" "any Planted.Round time planted"
+mkdir "$plot/slow"
+cp "$plot/two/CMakeCache.txt" "$plot/slow/"
+for i in 1 2 3 4; do
+  echo "add_test(Planted.Slow$i sh -c \"[ -e $plot/slow/at$i ] || ! touch $plot/slow/at$i\")"
+done >"$plot/slow/CTestTestfile.cmake"
+slow_suite() { echo >"$plot/suite/skips.txt"; echo "any * $1 planted" >"$plot/suite/retries.txt"; rm -f "$plot/slow/at"*; PYTHONDONTWRITEBYTECODE=1 "$plot/suite/suite.py" "$plot/slow"; }
+must_be_red "suite: four second runs of slow ones" "FAILED: Planted.Slow4: a second run, as were 3 others" slow_suite slow
+slow_suite time >"$plot/log" 2>&1 || { echo "the suite fails as four listed tests run again:"; cat "$plot/log"; failed=1; }
 must_be_red "suite: listed skip of no test" "skips.txt:2: no test matches Planted.Gone:" suite "$skip
 any Planted.Gone planted" "$round"
 must_be_red "suite: listed retry of no test" "retries.txt:2: no test matches Planted.Gone:" suite "$skip" "$round

@@ -91,12 +91,14 @@ name = "line1"
 core = 1
 share_core = true
 application = "/applications/bottling_line.so"
+settings = "/applications/line.cfg"
 
 [[instance]]
 name = "line2"
 core = 1
 share_core = true
 application = "/applications/bottling_line.so"
+settings = "/applications/line.cfg"
 
 [[instance]]
 name = "valves"
@@ -106,7 +108,8 @@ share_core = true
 application = "/applications/outputs.so"
 settings = "/applications/valves.cfg"
 EOF
-cat >"$applications/valves.cfg" <<'EOF'
+printf '[CmpSchedule]\nSchedulerInterval=1000\n' >"$applications/line.cfg"
+cat "$applications/line.cfg" - >"$applications/valves.cfg" <<'EOF'
 [SysMem]
 Linux.Area.0.Flags=0x8000
 Linux.Area.0.Address=0

@@ -12,6 +12,7 @@
 #include "api/cli/verbs/host_commands.hpp"
 #include "api/client/application_file.hpp"
 #include "api/dds/text.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 
@@ -62,7 +63,7 @@ int load(CliSession& session, const LoadArguments& arguments) {
   return command(
       session,
       {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path, arguments.boot, arguments.online},
-      fmt::format("{} is loaded", path));
+      done_text(operation_of(ControlVerb::load_application), path));
 }
 
 /// INSTANCE/PATH of what is loaded on a host.
@@ -111,7 +112,7 @@ int list_applications(CliSession& session, const std::string& instance) {
 
 void add_application_verbs(const Command& plcctl, CliSession& session) {
   const auto arguments = std::make_shared<LoadArguments>();
-  const char* const text = "Load another application into an instance";
+  const char* const text = operation_of(ControlVerb::load_application).help;
   plcctl.verb("load", text)
       .noun("application", text, [&session, arguments] { return load(session, *arguments); })
       .argument("INSTANCE", arguments->instance)
@@ -123,14 +124,14 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
       .flag("--boot", arguments->boot, kBootHelp)
       .flag("--online", arguments->online, kOnlineHelp);
   const auto back_to = std::make_shared<LoadArguments>();
-  const char* const back = "Load the predecessor of the loaded version again";
-  plcctl.verb("rollback", back)
-      .noun("application", back,
-            [&session, back_to] {
+  const Operation& rollback = operation_of(ControlVerb::rollback_application);
+  plcctl.verb("rollback", rollback.help)
+      .noun("application", rollback.help,
+            [&session, back_to, &rollback] {
               return command(session,
                              {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "", back_to->boot,
                               back_to->online},
-                             "the predecessor is loaded");
+                             done_text(rollback, ""));
             })
       .argument("INSTANCE", back_to->instance)
       .flag("--boot", back_to->boot, kBootHelp)

@@ -99,7 +99,7 @@ void add_reset(const Command& plcctl, CliSession& session) {
   const auto names = std::make_shared<std::vector<std::string>>();
   const auto cold = std::make_shared<bool>(false);
   plcctl.verb("reset", "Begin anew: an instance, or its statistics")
-      .noun("instance", "Load the application anew, in a fresh process, stopped",
+      .noun("instance", operation_of(ControlVerb::reset).help,
             [&session, names, cold] {
               const Operation& reset = operation_of(*cold ? ControlVerb::reset_cold : ControlVerb::reset);
               return command_each(session, *names, request_of(reset, "", ""), done_text(reset, ""));

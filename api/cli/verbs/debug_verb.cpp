@@ -14,6 +14,7 @@
 #include "api/cli/debug/debug_link.hpp"
 #include "api/cli/interrupt.hpp"
 #include "shm/base/names.hpp"
+#include "shm/operations/operations.hpp"
 
 namespace plchost {
 
@@ -114,9 +115,9 @@ int debug(CliSession& session, const DebugArguments& arguments) {
 
 void add_debug_verb(const Command& plcctl, CliSession& session) {
   const auto arguments = std::make_shared<DebugArguments>();
-  constexpr const char* kText = "Debug the application of an instance: breakpoints, steps, values";
-  plcctl.verb("debug", kText)
-      .noun("instance", kText, [&session, arguments] { return debug(session, *arguments); })
+  const char* const text = operation_of(ControlVerb::debug).help;
+  plcctl.verb("debug", text)
+      .noun("instance", text, [&session, arguments] { return debug(session, *arguments); })
       .argument("INSTANCE", arguments->instance)
       .optional("COMMAND", arguments->commands,
                 "commands, each an argument, as 'break Main:7', wait and stack; 'help' lists them; none: the "

@@ -95,14 +95,15 @@ int command_for_each(CliSession& session, ControlVerb verb, const VariableArgume
   return code;
 }
 
-void add_command(const Command& plcctl, CliSession& session, ControlVerb verb, const char* word,
-                 const char* text, const char* form, const char* form_text) {
+void add_assignment(const Command& plcctl, CliSession& session, ControlVerb verb, const char* word) {
+  const char* const text = operation_of(verb).help;
   const auto arguments = std::make_shared<VariableArguments>();
   plcctl.verb(word, text)
       .noun("variable", text,
             [&session, verb, arguments] { return command_for_each(session, verb, *arguments); })
       .argument("INSTANCE", arguments->instance)
-      .arguments(form, arguments->names, form_text);
+      .arguments("ASSIGNMENT", arguments->names,
+                 "VARIABLE=VALUE, the value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
 }
 
 struct UnforceArguments {
@@ -219,16 +220,12 @@ void add_variable_verbs(const Command& plcctl, CliSession& session) {
             [&session, arguments] { return read_variables(session, *arguments); })
       .argument("INSTANCE", arguments->instance)
       .arguments("VARIABLE", arguments->names, kVariableNames);
-  add_command(plcctl, session, ControlVerb::write_variable, "write", "Write variables of an application",
-              "ASSIGNMENT",
-              "VARIABLE=VALUE, the value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
-  add_command(plcctl, session, ControlVerb::force_variable, "force",
-              "Force variables: each has its value at the begin and end of each cycle", "ASSIGNMENT",
-              "VARIABLE=VALUE, the value as Structured Text writes it, as 5, TRUE, T#1s or 'text'");
+  add_assignment(plcctl, session, ControlVerb::write_variable, "write");
+  add_assignment(plcctl, session, ControlVerb::force_variable, "force");
   const auto unforced = std::make_shared<UnforceArguments>();
-  plcctl.verb("unforce", "End the forcing of variables, which keep the values that they have")
-      .noun("variable", "End the forcing of variables, which keep the values that they have",
-            [&session, unforced] { return unforce(session, *unforced); })
+  const char* const unforce_text = operation_of(ControlVerb::unforce_variable).help;
+  plcctl.verb("unforce", unforce_text)
+      .noun("variable", unforce_text, [&session, unforced] { return unforce(session, *unforced); })
       .argument("INSTANCE", unforced->which.instance)
       .optional("VARIABLE", unforced->which.names, "their names")
       .flag("--all", unforced->all, "all forced variables of the instance");

@@ -42,7 +42,7 @@ void describe(CLI::App& app, Options& options) {
   config->excludes(check);
   const std::vector<std::string> levels(kLogLevels.begin(), kLogLevels.end());
   app.add_option("--log-level", options.log_level,
-                 "Instead of the file's: trace, debug, info, warning, error")
+                 fmt::format("Instead of the file's: {}", join_names(kLogLevels)))
       ->check(CLI::IsMember(levels));
 }
 

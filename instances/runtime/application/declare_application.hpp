@@ -60,7 +60,8 @@ struct LoadContext {
                                                               const LoadContext& context);
 
 /// Makes a declaration hold that was checked as a whole: at a first load, and in an online change. Control
-/// thread.
+/// thread. An online change exchanges the variables that are seen from outside by itself, as the last step of
+/// its take-over.
 class Commit {
  public:
   /// Takes all steps that can fail: registers the events that are new and, at a first load, places the areas

@@ -3,6 +3,8 @@
 
 #include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
+#include "shm/base/bounds.hpp"
+#include "shm/base/stop_limits.hpp"
 #include "shm/pages/instance_page.hpp"
 
 namespace plchost {
@@ -13,6 +15,9 @@ using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
 constexpr std::string_view kScheduleSection = "CmpSchedule";
+
+constexpr Bounds<Duration> kStopOfOutputs{.lowest = milliseconds(1), .highest = kMaxStopOfOutputs};
+constexpr Bounds<Duration> kStopOfOthers{.lowest = milliseconds(1), .highest = kMaxStopOfOthers};
 
 template <auto kMember>
 using ScheduleAt = At<&InstanceSettings::scheduler, kMember>;
@@ -85,17 +90,16 @@ constexpr std::array kScheduleKeys = {
                .unit = "events",
                .meaning = "posts that a task may lag behind before it drops and counts them",
                .value = number_setting<ScheduleAt<&SchedulerSettings::max_event_backlog>>(kEventBacklog)},
-    // The manager waits as long as the highest of them allow.
     SettingKey{.section = kScheduleSection,
                .name = "Stop.OutputsLimitMs",
                .unit = "ms",
                .meaning = "time in a stop for the cycles of tasks that drive outputs",
-               .value = number_setting<StopAt<&StopLimits::outputs>, As<milliseconds>>(1, 10'000)},
+               .value = number_setting<StopAt<&StopLimits::outputs>, As<milliseconds>>(kStopOfOutputs)},
     SettingKey{.section = kScheduleSection,
                .name = "Stop.OthersLimitMs",
                .unit = "ms",
                .meaning = "time in a stop for the other tasks, which come after them",
-               .value = number_setting<StopAt<&StopLimits::others>, As<milliseconds>>(1, 25'000)},
+               .value = number_setting<StopAt<&StopLimits::others>, As<milliseconds>>(kStopOfOthers)},
     SettingKey{.section = kScheduleSection,
                .name = "Statistics.FineTasks",
                .unit = "tasks",

@@ -53,7 +53,7 @@ constexpr std::array kTaskKeys = {
         .meaning = "overruns in a row that are a hit; so is one cycle of this many times the time",
         .value =
             number_setting<TaskWatchdogAt<&TaskSettings::watchdog_sensitivity, &TaskWatchdog::sensitivity>>(
-                1, kMaxWatchdogCount)},
+                kWatchdogSensitivity)},
     SettingKey{.section = kTaskSections,
                .name = "Watchdog.OmittedCycles",
                .unit = "cycles, 0 is off",

@@ -1,11 +1,9 @@
 #include "instances/runtime/setup/options.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -14,16 +12,13 @@
 #include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log_levels.hpp"
+#include "shm/pages/host_words.hpp"
 
 namespace plchost {
 
 namespace {
 
-constexpr std::array kBands = {
-    std::pair{std::string_view("high"), PriorityBand::high},
-    std::pair{std::string_view("normal"), PriorityBand::normal},
-    std::pair{std::string_view("low"), PriorityBand::low},
-};
+static_assert(static_cast<std::size_t>(PriorityBand::low) + 1 == kPriorityBandNames.size());
 constexpr int kMaxCore = 1023;
 
 // In CLI11 a validator returns the text of what is wrong, or nothing.
@@ -45,8 +40,9 @@ std::string check_pool_name(const std::string& name) {
 }
 
 std::string check_band(const std::string& name) {
-  const bool known = std::ranges::any_of(kBands, [&](const auto& band) { return band.first == name; });
-  return known ? std::string() : fmt::format("'{}' is no priority band: high, normal and low are", name);
+  const bool known = std::ranges::find(kPriorityBandNames, name) != kPriorityBandNames.end();
+  return known ? std::string()
+               : fmt::format("'{}' is no priority band: {} are", name, join_names(kPriorityBandNames));
 }
 
 std::string check_log_level(const std::string& name) {
@@ -148,10 +144,8 @@ ParsedOptions parse_options(int argc, const char* const* argv) {
     return {.options = std::nullopt, .exit_code = code == 0 ? 0 : kExitUsage};
   }
   if (const auto kind = start_kind_of(options.start_kind)) options.launch.start_kind = *kind;
-  options.band =
-      std::ranges::find(kBands, std::string_view(options.launch.priority_band), [](const auto& band) {
-        return band.first;
-      })->second;
+  options.band = static_cast<PriorityBand>(
+      std::ranges::find(kPriorityBandNames, options.launch.priority_band) - kPriorityBandNames.begin());
   return {.options = std::move(options), .exit_code = 0};
 }
 

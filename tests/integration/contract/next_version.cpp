@@ -1,8 +1,11 @@
 // Programs of a version of the contract that is still to come: it has a topic, an operation and fields more
 // (next_version.py). They are built from that contract and Cyclone DDS, and from nothing else of plchost.
-//   next_version client DOMAIN HOST INSTANCE EVENT COUNT   asks for what is new, then for what today's hosts
-//   can do, too next_version host DOMAIN                               host "next" with instance "press":
-//   until SIGTERM
+//
+//   next_version client DOMAIN HOST INSTANCE EVENT COUNT
+//       asks for what is new, then for what today's hosts can do, too
+//
+//   next_version host DOMAIN
+//       host "next" with instance "press": until SIGTERM
 
 #include <span>
 #include <string>

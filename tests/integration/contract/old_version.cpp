@@ -1,8 +1,11 @@
 // Programs as they were built when version 1 was made: from control_v1.idl and Cyclone DDS, and nothing else
 // of plchost.
-//   old_version client DOMAIN HOST INSTANCE EVENT COUNT   lists instances, starts one, posts, asks for the
-//   objects old_version host DOMAIN                               host "old" with instance "press": until
-//   SIGTERM
+//
+//   old_version client DOMAIN HOST INSTANCE EVENT COUNT
+//       lists instances, starts one, posts, asks for the objects
+//
+//   old_version host DOMAIN
+//       host "old" with instance "press": until SIGTERM
 
 #include "small_client.hpp"
 #include "small_host.hpp"

@@ -14,6 +14,7 @@
 #include "api/plchost_client.hpp"
 #include "api/server/access/request_check.hpp"
 #include "api/server/manager_link.hpp"
+#include "shm/base/stop_limits.hpp"
 #include "shm/operations/operations.hpp"
 
 namespace plchost {
@@ -47,6 +48,13 @@ TEST(OperationTable, NamesAndVerbsAreUnique) {
   }
 }
 
+TEST(OperationTable, HasHelpForEachCommandOfAClient) {
+  for (const Operation& operation : operations()) {
+    const bool is_command = operation.place != OperationPlace::internal && !operation.only_reads;
+    EXPECT_EQ(is_command, *operation.help != '\0') << operation.name;
+  }
+}
+
 TEST(OperationTable, ShowsClientsNothingThatOnlyTheManagerAsks) {
   EXPECT_EQ(find_operation(static_cast<std::int32_t>(ControlVerb::shutdown)), nullptr);
   EXPECT_EQ(find_operation("shutdown"), nullptr);
@@ -64,7 +72,7 @@ TEST(OperationTable, OnlyWhatIsOfAHostOrReadsNamesNoInstance) {
 
 TEST(OperationTable, HasTheTimeOfEachOperation) {
   using std::chrono::seconds;
-  EXPECT_EQ(operation_of(ControlVerb::stop).limit, seconds(38));
+  EXPECT_EQ(operation_of(ControlVerb::stop).limit, kStopLimit);
   EXPECT_EQ(operation_of(ControlVerb::single_cycle).limit, seconds(28));
   EXPECT_EQ(operation_of(ControlVerb::change_application).limit, seconds(18));
   EXPECT_EQ(operation_of(ControlVerb::set_scheduler).limit, seconds(10));

@@ -13,6 +13,7 @@
 #include "api/cli/rows/table.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/text.hpp"
+#include "shm/pages/host_words.hpp"
 
 namespace plchost {
 namespace {
@@ -186,9 +187,9 @@ TEST(DomainConfiguration, LetsNoOptionIntoTheXml) {
   options.peers = {"<x>"};
   EXPECT_FALSE(dds::domain_configuration(dds::Role::client, options));
   options.peers = {};
-  options.domain = dds::kMaxDomain + 1;
+  options.domain = kMaxDdsDomain + 1;
   EXPECT_FALSE(dds::domain_configuration(dds::Role::client, options));
-  options.domain = dds::kMaxDomain;
+  options.domain = kMaxDdsDomain;
   EXPECT_TRUE(dds::domain_configuration(dds::Role::client, options));
 }
 

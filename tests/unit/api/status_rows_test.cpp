@@ -273,6 +273,22 @@ TEST(StatusWords, AreTheNamesOfTheCodesInThePrograms) {
   expect_names<FindingLevel>(dds::words::HostFinding::level);
 }
 
+/// A state has in logs and errors of the programs the word of the contract, as people write it.
+template <class Code, std::size_t kSize>
+void expect_texts(const std::array<std::string_view, kSize>& words) {
+  for (std::size_t code = 0; code < kSize; ++code) {
+    std::string word(words[code]);
+    std::ranges::replace(word, '_', ' ');
+    EXPECT_EQ(to_string(static_cast<Code>(code)), word);
+  }
+}
+
+TEST(StatusWords, AreTheTextsOfTheStatesInThePrograms) {
+  expect_texts<InstanceState>(dds::words::InstanceStatus::state);
+  expect_texts<PageTaskState>(dds::words::TaskStatus::state);
+  expect_texts<ApplicationState>(dds::words::Transition::from_state);
+}
+
 TEST(StatusWords, OfTheKindsOfTasksAreThoseOfTheirTable) {
   for (const TaskKindTraits& kind : kTaskKinds)
     EXPECT_EQ(dds::task_kind_name(std::to_underlying(kind.kind)), kind.name);
