@@ -162,7 +162,7 @@ shows_figures() { tail -n 1 "$work/terminal" | grep -q "driven; channel out/in: 
 until_true 20 "the packer's figures on the terminal" shows_figures
 tail -n 1 "$work/terminal"
 
-title "SIGKILL to an instance: it comes back, the others do not notice"
+title "SIGKILL to an instance: the manager restarts it, the others run on"
 # A stall of the whole machine loses cycles everywhere, with or without us: then the show is repeated. It goes on if the machine
 # has stalls without a kill, too.
 undisturbed=no
