@@ -9,6 +9,7 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
 * No sentence has the object of "who", a "who" behind "whether", or one that belongs to a "nobody" or "anybody" before it.
 * No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. A colon or ";" ends no sentence.
   A list of more is written as a list. Each line of a message of several lines is a sentence of its own.
+* No cell of a table has more than 36 words, unless a program makes the table: the rest is a text below it.
 * The text of an error of the programs does not begin with an imperative: "cannot open FILE", not "open FILE".
 * No text has a word that manager/glossary.md forbids (the column "not"), nor its plural, nor its forms with -ed and -ing.
 
@@ -30,6 +31,7 @@ from pathlib import Path
 
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
+CELL_WORDS = 36
 
 OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
 # In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`, `asks nobody for it who reads`.
@@ -70,14 +72,18 @@ HASH_FILES = (*CMAKE_FILES, ".service.in", ".toml", ".sh", ".sed", ".ci/run", ".
               ".ci/debian_root")
 CMAKE_TOKEN = re.compile(r"""#[^\n]*|"((?:\\.|[^"\\])*)\"""", re.DOTALL)
 PICTURE_TEXT = re.compile(r"<(text|title|desc)\b[^>]*>(.*?)</\1>", re.DOTALL)
+# Behind it, in a document, tables are made by a program.
+MADE = re.compile(r"<!-- (generated: |.*It is made: )")
+END_OF_MADE = "<!-- end of generated -->"
 ITEM = re.compile(r"([*+-]|\d+\.|\([a-z0-9]\)) +(?=\S)")
 
 
 class Text:
-    """Lines of one paragraph, each with its number."""
+    """Lines of one paragraph, each with its number. `cell`: of a table that no program makes."""
 
-    def __init__(self):
+    def __init__(self, cell=False):
         self.lines = []
+        self.cell = cell
 
     def fault_line(self, offset):
         """The line in which the character at that offset of joined() lies."""
@@ -95,13 +101,14 @@ def paragraphs(lines, columns=False):
     """Texts of (number, line) pairs: divided by empty lines, items of lists, tables, fences and drawings. With `columns`, as in
     a comment, a line with gaps or arrows in it is a drawing, too."""
     text = Text()
-    fenced = False
+    fenced = made = False
     before_empty = True
     for number, line in lines:
         stripped = line.strip()
         if stripped.startswith(("```", "~~~")):
             fenced = not fenced
             stripped = ""
+        made = stripped != END_OF_MADE and (made or bool(MADE.match(stripped)))
         if fenced or not stripped or stripped.startswith(("#", "<!--", "![", "@code", "[!")):
             if text.lines:
                 yield text
@@ -124,7 +131,7 @@ def paragraphs(lines, columns=False):
                 yield text
             for cell in re.split(r"(?<!\\)\|", stripped.strip("|")):
                 if not re.fullmatch(r"[\s:-]*", cell):
-                    text = Text()
+                    text = Text(cell=not made)
                     text.lines = [(number, cell.strip())]
                     yield text
             text = Text()
@@ -253,7 +260,7 @@ def python_texts(source):
 
 def texts_of(name, source):
     if name.endswith(".md"):
-        return (("document", text) for text in documents(source))
+        return (("cell" if text.cell else "document", text) for text in documents(source))
     if name.endswith(C_FILES):
         return c_texts(source)
     if name.endswith(".py"):
@@ -291,6 +298,9 @@ def is_message(text):
 
 def faults_of(kind, text, forbidden):
     """(offset in the text, fault)"""
+    cell_words = len(WORD.findall(text)) if kind == "cell" else 0
+    if cell_words > CELL_WORDS:
+        yield 0, f"{cell_words} words in a cell, at most {CELL_WORDS}: {text[:50]}"
     for sentence in END_OF_SENTENCE.split(text):
         parts = [part for part in PART.split(sentence) if part]
         for part in parts:

@@ -233,6 +233,15 @@ and tells the client: what it says is final."
 plant_in_prose "prose: what, in a cell" "shm/planted.md:3: begins with 'what': what it holds" shm/planted.md "| place | holds |
 | --- | --- |
 | shm | what it holds |"
+plant_in_prose "prose: long cell" "shm/planted.md:3: 37 words in a cell, at most 36" shm/planted.md "| place | holds |
+| --- | --- |
+| shm | A$(printf ' word%.0s' {1..18}). A$(printf ' word%.0s' {1..17}). |"
+plant_in_prose "prose: long cell behind a table that is made" "shm/planted.md:6: 37 words in a cell, at most 36" shm/planted.md "<!-- generated: planted -->
+| place |
+| --- |
+<!-- end of generated -->
+
+| A$(printf ' word%.0s' {1..18}). A$(printf ' word%.0s' {1..17}). |"
 plant_in_prose "prose: who, within a sentence" "shm/planted.md:1: a clause begins with 'by who'" shm/planted.md "It is answered by who asks."
 plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..30})."
 plant_in_prose "prose: who, behind an and" "shm/planted.md:1: a clause begins with 'and who'" shm/planted.md "The task waits, and who asked hears of it."
@@ -278,6 +287,10 @@ plant_in_prose "prose: text of a picture" "api/planted.svg:2: 'DDS server' is no
 new_tree
 echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md"
 echo "Nobody waits. A client$(printf ' word%.0s' {1..9}): a$(printf ' word%.0s' {1..9}); a$(printf ' word%.0s' {1..8})." >>"$plot/tree/shm/planted.md"
+echo "| A$(printf ' word%.0s' {1..18}). A$(printf ' word%.0s' {1..16}). |
+<!-- generated: planted -->
+| A$(printf ' word%.0s' {1..18}). A$(printf ' word%.0s' {1..18}). |
+<!-- end of generated -->" >>"$plot/tree/shm/planted.md"
 echo "// Takes$(printf ' word%.0s' {1..28}). timed_out: after$(printf ' word%.0s' {1..28})." >"$plot/tree/shm/planted.hpp"
 printf '%s\n' "const char* m = \"A$(printf ' word%.0s' {1..29})\\nA$(printf ' word%.0s' {1..29})\\n\";" >"$plot/tree/shm/planted.cpp"
 echo "PLANTED = r\"(?P<word>a)$(printf ' word%.0s' {1..31})\"" >"$plot/tree/tests/planted.py"
