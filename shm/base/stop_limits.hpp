@@ -4,7 +4,7 @@
 
 namespace plchost {
 
-// The most that a stop may take. Settings allow no more, and whoever asks for a stop waits a little longer.
+// The most that a stop may take. Settings allow no more. A process that asks for a stop waits 3 s longer.
 
 inline constexpr Duration kMaxStopOfOutputs = std::chrono::seconds(10);  ///< tasks that drive outputs
 inline constexpr Duration kMaxStopOfOthers = std::chrono::seconds(25);   ///< the other tasks, after them

@@ -6,8 +6,8 @@
 
 namespace plchost {
 
-// Bounds and words of the configuration that other programs than the manager check, too: what its file may say
-// is what they take.
+// Bounds and words of the configuration that other programs than the manager check, too. They take all that
+// its file may say.
 
 /// Domains have UDP ports of their own: 7400 + 250 x domain must stay below 65536.
 inline constexpr std::uint32_t kMaxDdsDomain = 230;

@@ -47,7 +47,9 @@ TEST(Registry, EachSchedulerHasItsNameAndItsCapabilities) {
     EXPECT_LE(entry.name.size(), kMaxSchedulerName);
     EXPECT_EQ(scheduler->name(), entry.name);
     EXPECT_EQ(scheduler->capabilities().one_shot, entry.name == "CmpScheduleOneShot");
-    if (entry.name == "CmpSchedule") EXPECT_TRUE(entry.halts_external_tasks);
+    if (entry.name == "CmpSchedule") {
+      EXPECT_TRUE(entry.halts_external_tasks);
+    }
   }
 }
 
