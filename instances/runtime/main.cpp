@@ -106,14 +106,16 @@ int refuse_start(const Options& options, const Error& error) {
 }
 
 // As a service the manager has these for its children. By hand a process keeps what it was given. One that is
-// to be another user gives up all of its rights later.
-Result<void> give_up_managers_rights(const Options& options) {
-  if (!never_gains_rights() || !options.launch.user.empty()) return {};
+// to be another user gives up all of its rights later. None of them ever gains rights from here on.
+Result<void> give_up_rights(const Options& options) {
+  const bool of_service = never_gains_rights();
+  PLCHOST_TRY(refuse_new_rights());
+  if (!of_service || !options.launch.user.empty()) return {};
   return give_up_capabilities({CAP_SETGID, CAP_SETUID});
 }
 
 int run(const Options& options) {
-  if (const auto given_up = give_up_managers_rights(options); !given_up)
+  if (const auto given_up = give_up_rights(options); !given_up)
     return refuse_start(options, given_up.error());
   for (const unsigned user : options.launch.trusted_users) trust_instances_of(user);
   if (!options.check_settings.empty()) return check_settings(options.check_settings);

@@ -61,6 +61,11 @@ Result<void> give_up_all_capabilities() {
   return renounce({UINT32_MAX, UINT32_MAX});
 }
 
+Result<void> refuse_new_rights() {
+  PLCHOST_TRY(check_errno(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0), "cannot set no_new_privs"));
+  return {};
+}
+
 bool never_gains_rights() noexcept {
   return ::prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0) == 1;
 }

@@ -15,7 +15,9 @@ namespace plchost {
 /// Set-up.
 [[nodiscard]] Result<void> keep_capabilities(std::initializer_list<unsigned> kept);
 
-/// Whether this process, and all that it starts, never gets more rights than it has: no_new_privs.
+/// Sets no_new_privs: this process, and all that it starts, never get more rights than it has. Set-up.
+[[nodiscard]] Result<void> refuse_new_rights();
+/// Whether that is so, by this process or by the one that has started it.
 [[nodiscard]] bool never_gains_rights() noexcept;
 
 }  // namespace plchost

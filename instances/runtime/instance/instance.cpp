@@ -10,6 +10,7 @@
 
 #include "instances/runtime/application/declare_application.hpp"
 #include "instances/runtime/setup/own_user.hpp"
+#include "instances/runtime/setup/sandbox.hpp"
 #include "instances/runtime/setup/set_up_watch.hpp"
 #include "instances/runtime/tasks/registered_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
@@ -214,6 +215,14 @@ LoadContext Instance::load_context() {
 }
 
 Result<std::string> Instance::load_application() {
+  PLCHOST_TRY_ASSIGN(const Confinement confinement, confine_to_load(start_.settings.seccomp));
+  if (!confinement.holds.empty()) spdlog::info("{}", confinement.holds);
+  PLCHOST_TRY_ASSIGN(const std::string remark, load_confined());
+  const bool both = !confinement.remark.empty() && !remark.empty();
+  return confinement.remark + (both ? "; " : "") + remark;
+}
+
+Result<std::string> Instance::load_confined() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
   const LoadContext context = load_context();
   PLCHOST_TRY_ASSIGN(auto declared, declare_application(options_.launch.application, context));
@@ -281,6 +290,8 @@ Result<std::string> Instance::make_tasks() {
 }
 
 Result<std::string> Instance::start_scheduler() {
+  PLCHOST_TRY_ASSIGN(const Confinement confinement, confine_to_start(start_.settings.seccomp));
+  if (!confinement.holds.empty()) spdlog::info("{}", confinement.holds);
   std::optional<TaskSet::Prepared> prepared;
   if (tasks_ && !options_.launch.stopped) {
     PLCHOST_TRY_ASSIGN(prepared, prepare_start());

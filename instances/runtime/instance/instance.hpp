@@ -99,6 +99,7 @@ class Instance {
   [[nodiscard]] Result<std::string> open_control_socket();
   [[nodiscard]] Result<std::string> load_components();
   [[nodiscard]] Result<std::string> load_application();
+  [[nodiscard]] Result<std::string> load_confined();
   [[nodiscard]] Result<std::string> make_status_page();
   [[nodiscard]] Result<std::string> make_tasks();
   [[nodiscard]] Result<std::string> start_scheduler();

@@ -31,6 +31,14 @@ enum class IdleStates : std::uint8_t {
   allow,      ///< nothing
 };
 
+/// [Sandbox] Seccomp: the system calls that the process gives up. Each word holds all that the one before
+/// does.
+enum class Seccomp : std::uint8_t {
+  off,         ///< none
+  no_exec,     ///< before the application is loaded: programs, other processes, the kernel
+  no_sockets,  ///< before the application starts: new sockets
+};
+
 /// [SysTime]: the clock that applications see, if it is not CLOCK_MONOTONIC. Both functions or none.
 struct SysTimeSettings {
   std::string get_us;   ///< the symbol of a function like SysTimeGetUs
@@ -118,6 +126,7 @@ struct InstanceSettings {
   StopLimits stop;
   TimerMode timer_mode = TimerMode::periodic;
   IdleStates idle_states = IdleStates::hold;
+  Seccomp seccomp = Seccomp::no_exec;
   SysTimeSettings sys_time;
   BlockSettings blocks;
   std::string device_description;   ///< file; empty: none, and any external event is allowed

@@ -169,7 +169,7 @@ const std::vector<SettingKey>& all_setting_keys() {
   static const std::vector<SettingKey> all = [] {
     std::vector<SettingKey> keys;
     for (const auto table : {schedule_keys(), timer_keys(), clock_keys(), block_keys(), task_keys(),
-                             component_keys(), application_keys(), memory_keys()}) {
+                             component_keys(), application_keys(), memory_keys(), sandbox_keys()}) {
       keys.insert(keys.end(), table.begin(), table.end());
     }
     return keys;

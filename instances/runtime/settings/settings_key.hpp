@@ -120,6 +120,7 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< the beginning of 
 [[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> application_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> memory_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> sandbox_keys() noexcept;
 
 /// The settings of all areas, checked as a whole. The error names the line of the area.
 [[nodiscard]] Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDraft>& drafts);

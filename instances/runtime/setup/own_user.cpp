@@ -47,7 +47,7 @@ void add_group_of(const std::string& pool, UserAccount& user) {
 Result<std::string> become_user_of_instances(const std::string& user, const std::string& pool) {
   PLCHOST_TRY_ASSIGN(auto account, find_user(user));
   add_group_of(pool, account);
-  PLCHOST_TRY(check_errno(::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0), "cannot set no_new_privs"));
+  PLCHOST_TRY(refuse_new_rights());
   const bool priorities = allows(RLIMIT_RTPRIO, kEachPriority);
   const bool memory = allows(RLIMIT_MEMLOCK, RLIM_INFINITY);
   PLCHOST_TRY(check_errno(::prctl(PR_SET_KEEPCAPS, 1, 0, 0, 0), "cannot keep capabilities"));

@@ -16,6 +16,7 @@
 #include "instances/runtime/blocks/block_service.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup/process_setup.hpp"
+#include "instances/runtime/setup/sandbox.hpp"
 #include "instances/runtime/setup/set_up_watch.hpp"
 #include "instances/runtime/trial/trial.hpp"
 #include "schedulers/task_set.hpp"
@@ -121,6 +122,7 @@ Result<DeclaredApplication> declare_watched(const std::string& path, const LoadC
   });
   constexpr std::array<PF_SYSTIME, 2> kOwnTime = {SysTimeGetUs, SysTimeGetNs};
   PLCHOST_TRY(load_components(settings, ComponentHooks::check, components, context.host, kOwnTime));
+  PLCHOST_TRY(confine_to_load(settings.seccomp));
   auto declared = declare_application(path, context);
   if (auto ended = watch.end(); !ended && declared) return std::unexpected(std::move(ended).error());
   return declared;
