@@ -95,6 +95,7 @@ pid=$(instance line1 pid)
 is "$(status "$pid" Gid)" "$group $group $group $group" || fail "its group: $(status "$pid" Gid)"
 is "$(status "$pid" Groups | xargs -n1 | sort -u | paste -sd' ')" "$group $user" || fail "its groups: $(status "$pid" Groups)"
 is "$(status "$pid" NoNewPrivs)" 1 || fail "it may gain rights"
+is "$(status "$pid" Seccomp)" 2 || fail "it has no filter of system calls"
 of_real_time=$(printf '%016x' $(((1 << 23) | (1 << 14))))
 is "$(capabilities "$pid")" "$of_real_time $of_real_time $none $none" || fail "its capabilities: $(capabilities "$pid")"
 for name in line1 line2 line3; do is_real_time "$name"; done
