@@ -21,8 +21,8 @@
 #include "manager/retain_memories.hpp"
 #include "manager/store/store_process.hpp"
 #include "manager/supervisor/instance_files.hpp"
-#include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
+#include "manager/system/oom_score.hpp"
 #include "manager/system/service_manager.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/thread.hpp"
@@ -157,6 +157,8 @@ Result<void> Manager::set_up() {
   PLCHOST_TRY(check_state_folders());
   if (auto alone = lock_wishes(); !alone) return alone;
   PLCHOST_TRY(check_state_folders());  // one that somebody else has made meanwhile
+  can_lower_oom_scores_ = take_oom_score(kInstanceOomScore, kManagerOomScore);
+  groups_ = ControlGroups::find(host.instance_groups);
   // Children inherit this: instances then bind themselves to their own cores.
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
     spdlog::warn("cannot bind the manager to housekeeping_cores: {}", bound.error().describe());
@@ -187,7 +189,7 @@ Result<void> Manager::set_up() {
   make_supervisor();
   write_host();
   host_check_ =
-      std::make_unique<HostCheckHandler>(*supervisor_, [this] { return check_host(this_host(config_)); });
+      std::make_unique<HostCheckHandler>(*supervisor_, [this] { return check_host(checked_host()); });
   reload_ = std::make_unique<ConfigReload>(
       *reactor_,
       ConfigReload::Settings{
@@ -207,7 +209,9 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
                                        .name = instance.name,
                                        .pool = own.pool,
                                        .run_directory = own.run_directory,
-                                       .prepare = [this, name = instance.name] { prepare_files(name); }});
+                                       .prepare = [this, name = instance.name] { prepare_files(name); },
+                                       .groups = &groups_,
+                                       .share = [this, name = instance.name] { return share_of(name); }});
   ProcessHost& made = *host;
   auto applications = std::make_unique<StoreProcess>(
       *reactor_, state_disk_,
@@ -229,6 +233,25 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
       .applications = std::move(applications),
       .wishes = std::move(wishes),
       .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
+}
+
+// As the configuration is now.
+ProcessHost::Share Manager::share_of(const std::string& instance) const {
+  constexpr std::uint64_t kMib = 1U << 20;
+  const auto config = std::ranges::find(config_.instances, instance, &InstanceConfig::name);
+  if (config == config_.instances.end()) return {};
+  ProcessHost::Share share{
+      .limits = {.memory_bytes = config->memory_max_mib * kMib, .pids = config->pids_max}, .oom_score = {}};
+  // The default is refused where nobody has the right to it, which is no fault of the configuration.
+  if (can_lower_oom_scores_ || config->oom_score != kInstanceOomScore) share.oom_score = config->oom_score;
+  return share;
+}
+
+CheckedHost Manager::checked_host() const {
+  CheckedHost host = this_host(config_);
+  host.groups = {.folder = groups_.folder(), .problem = groups_.problem(), .missing = {}};
+  for (const auto& [controller, why] : groups_.missing()) host.groups.missing.emplace_back(controller, why);
+  return host;
 }
 
 void Manager::make_supervisor() {
@@ -286,13 +309,14 @@ Result<void> Manager::run() {
   spdlog::info("host '{}': {}, pool '{}', run directory {}", config_.host.name,
                count_text(config_.instances.size(), "instance"), config_.host.pool,
                config_.host.run_directory);
+  groups_.remove_empty(control_group_name(config_.host.pool, ""));
   adopt_removed();
   warn_of_strangers(config_.host.run_directory, supervisor_->configs());
   supervisor_->start();
   api_server_.start();
   tick_.set(MonotonicClock::now() + kTick);
   notify_service_manager("READY=1");
-  log_findings(check_host(this_host(config_)));
+  log_findings(check_host(checked_host()));
   return reactor_->run();
 }
 
@@ -313,6 +337,7 @@ void Manager::look_after_pool() {
                  config_.host.pool);
   }
   for (const auto& [instance, wishes] : wishes_) wishes->look_after_memory();
+  (void)groups_.remove_ended();
   const PoolFindings found = pool_->tidy();
   if (!found.lost && found.headers_mended + found.rebuilds + found.lost_objects != 0) {
     spdlog::warn(
@@ -374,8 +399,17 @@ void Manager::shut_down() {
   });
 }
 
+// Processes that were ended just now may still be there.
+void Manager::remove_groups() {
+  constexpr Duration kPatience = std::chrono::milliseconds(500);
+  constexpr Duration kAgain = std::chrono::milliseconds(5);
+  const TimePoint deadline = MonotonicClock::now() + kPatience;
+  while (!groups_.remove_ended() && MonotonicClock::now() < deadline) std::this_thread::sleep_for(kAgain);
+}
+
 void Manager::clean_up() {
   restore_latency();
+  remove_groups();
   for (const auto& [instance, wishes] : wishes_) wishes->end();
   // Also those that were removed from the configuration.
   config_.instances = supervisor_->configs();

@@ -15,11 +15,14 @@
 #include "manager/config/manager_config.hpp"
 #include "manager/control/command_server.hpp"
 #include "manager/control/config_reload.hpp"
+#include "manager/host_check/host_check.hpp"
 #include "manager/host_check/host_check_handler.hpp"
 #include "manager/store/wish_folder.hpp"
 #include "manager/store/wish_store.hpp"
 #include "manager/supervisor/instance_files.hpp"
+#include "manager/supervisor/process_host.hpp"
 #include "manager/supervisor/supervisor.hpp"
+#include "manager/system/control_groups.hpp"
 #include "manager/system/disk_thread.hpp"
 #include "manager/system/reactor.hpp"
 #include "manager/system/service_manager.hpp"
@@ -64,6 +67,9 @@ class Manager : private InstanceObserver {
   void prepare_files(const std::string& instance);
   void make_supervisor();
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
+  [[nodiscard]] ProcessHost::Share share_of(const std::string& instance) const;
+  [[nodiscard]] CheckedHost checked_host() const;
+  void remove_groups();
   void adopt_removed();
   [[nodiscard]] Result<std::vector<std::string>> reload();
   void take_over_host(const ManagerConfig& now, std::vector<std::string>& lines);
@@ -94,6 +100,8 @@ class Manager : private InstanceObserver {
   WishFolderLock wishes_lock_;
   std::unique_ptr<Reactor> reactor_;
   InstanceUser instance_user_;
+  ControlGroups groups_;
+  bool can_lower_oom_scores_ = false;
   std::optional<ObjectPool> pool_;
   std::optional<HostPageWriter> page_;
   HostStatus host_status_;

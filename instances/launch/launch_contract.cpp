@@ -86,6 +86,8 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
   if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
   if (!options.state_directory.empty()) add("--state-directory", options.state_directory);
   if (!options.user.empty()) add("--user", options.user);
+  if (!options.group.empty()) add("--group", options.group);
+  if (options.oom_score) add("--oom-score", std::to_string(*options.oom_score));
   for (const unsigned user : options.trusted_users) add("--trusted-user", std::to_string(user));
   if (options.no_debug) arguments.emplace_back("--no-debug");
   if (options.stopped) arguments.emplace_back("--stopped");
@@ -97,6 +99,10 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
 
 std::string instance_socket_path(std::string_view run_directory, std::string_view instance) {
   return fmt::format("{}/{}.sock", run_directory, instance);
+}
+
+std::string instance_claim_path(std::string_view run_directory, std::string_view instance) {
+  return fmt::format("{}/{}.claim", run_directory, instance);
 }
 
 std::string kept_settings_path(std::string_view run_directory, std::string_view instance) {

@@ -38,6 +38,8 @@ struct LaunchOptions {
   std::string run_directory;     ///< --run-directory DIR; empty: no control socket (by hand)
   std::string state_directory;  ///< --state-directory DIR: for what outlives a power cut; empty: nothing does
   std::string user;             ///< --user NAME or number; empty: that of the caller
+  std::string group;            ///< --group DIR: the control group to run in; empty: that of the caller
+  std::optional<int> oom_score;             ///< --oom-score N: oom_score_adj; nothing: that of the caller
   std::vector<unsigned> trusted_users;      ///< --trusted-user N: their pages are those of instances, too
   bool no_debug = false;                    ///< --no-debug: an application that is a debug build is refused
   bool stopped = false;                     ///< --stopped: load the application, do not start it
@@ -63,6 +65,9 @@ inline constexpr std::string_view kSaveRetainOption = "--save-retain";
 
 /// The control socket of an instance: "RUN_DIRECTORY/NAME.sock". ControlRequests in, ControlReplies out.
 [[nodiscard]] std::string instance_socket_path(std::string_view run_directory, std::string_view instance);
+
+/// Held by the process of an instance as long as it runs: "RUN_DIRECTORY/NAME.claim".
+[[nodiscard]] std::string instance_claim_path(std::string_view run_directory, std::string_view instance);
 
 /// Where a process keeps the texts of its settings files when it is up: "RUN_DIRECTORY/NAME.settings".
 [[nodiscard]] std::string kept_settings_path(std::string_view run_directory, std::string_view instance);

@@ -16,6 +16,7 @@
 #include "instances/runtime/memory/retain_keeper.hpp"
 #include "instances/runtime/settings/read_settings.hpp"
 #include "instances/runtime/setup/options.hpp"
+#include "instances/runtime/setup/own_group.hpp"
 #include "instances/runtime/setup/own_user.hpp"
 #include "instances/runtime/trial/trial.hpp"
 #include "shm/base/system_call.hpp"
@@ -115,11 +116,13 @@ Result<void> give_up_rights(const Options& options) {
 }
 
 int run(const Options& options) {
+  const std::string refused = take_own_group(options.launch);
   if (const auto given_up = give_up_rights(options); !given_up)
     return refuse_start(options, given_up.error());
   for (const unsigned user : options.launch.trusted_users) trust_instances_of(user);
   if (!options.check_settings.empty()) return check_settings(options.check_settings);
   start_log("plc-instance/" + options.launch.name, options.launch.log_level);
+  if (!refused.empty()) spdlog::warn("{}", refused);
   const auto signals = take_signals();
   if (!signals) return refuse_start(options, signals.error());
   // An instance itself does that when it has read its settings: idle states are root's to hold.

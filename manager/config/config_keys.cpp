@@ -107,6 +107,13 @@ constexpr std::array kHostKeys = {
          .meaning =
              "user of the instances, see [Rights](install.md#rights). Another one needs a manager that "
              "is root; the manager's group is theirs, too"}),
+    host<&HostConfig::instance_groups, TextKey<AbsolutePathRule<kMaxPath>>>(
+        {.name = "instance_groups",
+         .when = next_manager,
+         .why = "running instances stay in their groups",
+         .initial = "that of `plchost-instances.service` beside the manager's unit",
+         .meaning = "folder of control groups (version 2) in which the manager makes one for each instance, "
+                    "see [Control groups](install.md#control-groups)"}),
     host<&HostConfig::cores, CoresKey>({.name = "cores",
                                         .when = at_once,
                                         .initial = "the kernel's isolated cores, else all",
@@ -212,6 +219,22 @@ constexpr std::array kInstanceKeys = {
         {.name = "priority_band",
          .when = next_process,
          .meaning = "the order of instances that share a core"}),
+    instance<&InstanceConfig::memory_max_mib, NumberKey<kMinMemoryMib, kMaxMemoryMib>>(
+        {.name = "memory_max_mib",
+         .when = next_process,
+         .initial = "no limit",
+         .meaning = "the most memory of all its processes together, MiB. One that needs more is ended, with "
+                    "all others of the instance"}),
+    instance<&InstanceConfig::pids_max, NumberKey<kMinPids, kMaxPids>>(
+        {.name = "pids_max",
+         .when = next_process,
+         .initial = "no limit",
+         .meaning = "the most threads and processes that it has at a time; each task is a thread"}),
+    instance<&InstanceConfig::oom_score, NumberKey<kMinOomScore, kMaxOomScore>>(
+        {.name = "oom_score",
+         .when = next_process,
+         .meaning = "if the host has no memory left, the kernel ends processes with a high one first "
+                    "(`oom_score_adj`). Other programs have 0, the manager has -900"}),
     instance<&InstanceConfig::settings, FileKey>(
         {.name = "settings",
          .when = next_process,

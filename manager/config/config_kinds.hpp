@@ -137,6 +137,15 @@ struct AbsoluteFolderRule {
   }
 };
 
+template <std::size_t Most>
+struct AbsolutePathRule {
+  static std::string form() { return fmt::format("an absolute path of up to {} characters", Most); }
+  static std::string wrong(const ConfigReading&, const std::string& path) {
+    if (path.empty() || (path.starts_with('/') && path.size() <= Most)) return "";
+    return fmt::format("\"{}\" is not allowed; allowed is {}", path.substr(0, kMaxPath), form());
+  }
+};
+
 struct UserRule {
   static std::string form() { return "name or number in quotes"; }
   static std::string wrong(const ConfigReading&, const std::string& user) {

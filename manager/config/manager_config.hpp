@@ -13,6 +13,11 @@
 
 namespace plchost {
 
+/// Which processes the kernel ends first when the host has no memory left: those with the highest
+/// oom_score_adj. Others have 0. The end of an instance stops a machine, that of the manager stops none.
+inline constexpr int kInstanceOomScore = -950;
+inline constexpr int kManagerOomScore = -900;
+
 /// [host]: the controller as a whole.
 struct HostConfig {
   std::string name;                 ///< default: the system's host name
@@ -28,8 +33,9 @@ struct HostConfig {
   std::string pool_group;   ///< group's name or number; empty: that of the user that starts the manager
   mode_t pool_mode = 0660;  ///< permission bits of the pool and, where nothing else is said, of its memories
   std::string
-      instance_user;       ///< name or number of the user that instances run as; empty: that of the manager
-  std::vector<int> cores;  ///< where instances may run
+      instance_user;  ///< name or number of the user that instances run as; empty: that of the manager
+  std::string instance_groups;  ///< folder of their control groups; empty: that of plchost-instances.service
+  std::vector<int> cores;       ///< where instances may run
   std::vector<int> housekeeping_cores;       ///< where the manager and the API server run
   std::string read_variables = "engineer";   ///< the role that may, of a secured host
   std::string write_variables = "engineer";  ///< the same, also to force
@@ -64,8 +70,11 @@ struct InstanceConfig {
   bool share_core = false;
   std::string scheduler;  ///< empty: as the settings say, else CmpSchedule
   std::string priority_band = "normal";
-  std::string settings;     ///< empty: the runtime's defaults
-  std::string application;  ///< empty: comes up without one
+  std::uint32_t memory_max_mib = 0;   ///< of all its processes; 0: no limit
+  std::uint32_t pids_max = 0;         ///< threads and processes; 0: no limit
+  int oom_score = kInstanceOomScore;  ///< oom_score_adj
+  std::string settings;               ///< empty: the runtime's defaults
+  std::string application;            ///< empty: comes up without one
   bool autostart = true;
   std::vector<std::string> after;  ///< started only when these are up
   RestartPolicy restart = RestartPolicy::on_failure;
@@ -92,6 +101,13 @@ inline constexpr std::size_t kMaxPoolName = 31;
 /// So that "RUN_DIRECTORY/NAME.sock" fits in the 107 characters of a socket path.
 inline constexpr std::size_t kMaxRunDirectory = 70;
 inline constexpr std::int64_t kMaxApplicationVersions = 100;
+inline constexpr std::int64_t kMinMemoryMib = 16;
+inline constexpr std::int64_t kMaxMemoryMib = 1'048'576;
+inline constexpr std::int64_t kMinPids = 16;
+inline constexpr std::int64_t kMaxPids = 100'000;
+/// The kernel never ends a process with -1000: at its own limit of memory that would stand still.
+inline constexpr std::int64_t kMinOomScore = -999;
+inline constexpr std::int64_t kMaxOomScore = 1000;
 inline constexpr std::size_t kMaxPeers = 32;
 inline constexpr std::int64_t kMaxRestartDelayMs = 3'600'000;
 inline constexpr std::int64_t kMaxCrashLimit = 100;

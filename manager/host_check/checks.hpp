@@ -18,6 +18,7 @@ HostFinding priority_limit(const CheckedHost& host);
 HostFinding memory_lock(const CheckedHost& host);
 HostFinding allowed_cores(const CheckedHost& host);
 HostFinding cpu_quota(const CheckedHost& host);
+HostFinding instance_limits(const CheckedHost& host);
 // checks_kernel.cpp
 HostFinding preemption(const CheckedHost& host);
 HostFinding throttling(const CheckedHost& host);

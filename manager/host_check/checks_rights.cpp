@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -140,6 +141,37 @@ HostFinding cpu_quota(const CheckedHost& host) {
     return unknown(kSubject, nothing, kWhy);
   }
   return finding(FindingLevel::ok, kSubject, "none", kWhy);
+}
+
+HostFinding instance_limits(const CheckedHost& host) {
+  constexpr auto kSubject = "control groups of instances";
+  constexpr auto kWhy =
+      "an application that takes all memory or all threads takes them from the other instances, too; "
+      "processes that it has forked can outlive it";
+  constexpr auto kAdvice =
+      "start the manager by plchostd.service with plchost-instances.service, or give it a folder of control "
+      "groups by [host] instance_groups; boot without cgroup_disable=memory";
+  const auto lacks = [&](std::string_view controller) {
+    const auto& missing = host.groups.missing;
+    return !host.groups.problem.empty() || host.groups.folder.empty() ||
+           std::ranges::any_of(missing, [&](const auto& one) { return one.first == controller; });
+  };
+  std::string found = host.groups.problem.empty() ? host.groups.folder : "none: " + host.groups.problem;
+  for (const auto& [controller, why] : host.groups.missing)
+    found += fmt::format("; without {}: {}", controller, why);
+  std::vector<std::string> limits;
+  for (const CheckedHost::Instance& instance : host.instances) {
+    if (instance.memory_limited && lacks("memory")) limits.push_back("memory_max_mib of " + instance.name);
+    if (instance.pids_limited && lacks("pids")) limits.push_back("pids_max of " + instance.name);
+  }
+  constexpr std::size_t kNamed = 4;
+  if (!limits.empty()) {
+    return finding(FindingLevel::warning, kSubject,
+                   fmt::format("{}; these limits do not hold: {}", found, join_some(limits, ", ", kNamed)),
+                   kWhy, kAdvice);
+  }
+  const bool all = !lacks("memory") && !lacks("pids");
+  return finding(all ? FindingLevel::ok : FindingLevel::note, kSubject, found, kWhy, all ? "" : kAdvice);
 }
 
 }  // namespace plchost::host_check

@@ -19,6 +19,7 @@ constexpr std::array kChecks = {
     HostCheck{"priority_limit", &host_check::priority_limit},
     HostCheck{"memory_lock", &host_check::memory_lock},
     HostCheck{"allowed_cores", &host_check::allowed_cores},
+    HostCheck{"instance_limits", &host_check::instance_limits},
     HostCheck{"preemption", &host_check::preemption},
     HostCheck{"isolated_cores", &host_check::isolated_cores},
     HostCheck{"housekeeping", &host_check::housekeeping},
@@ -45,8 +46,8 @@ constexpr std::array kChecks = {
 };
 static_assert(kChecks.size() <= kMaxFindings);
 
-// The calling thread is SCHED_FIFO for a moment, and then as before. The instances get the same: they are in
-// the same control group and have the same rights.
+// The calling thread is SCHED_FIFO for a moment, and then as before. The instances get the same: they have
+// the same rights, and only version 1 of control groups, which they inherit, has real-time run time.
 int try_fifo() {
   const int policy = ::sched_getscheduler(0);
   sched_param before{};
@@ -75,7 +76,10 @@ std::vector<HostFinding> check_host(const CheckedHost& host) {
 CheckedHost this_host(const ManagerConfig& config) {
   CheckedHost host{.files = HostFiles(), .instances = {}, .try_fifo = try_fifo};
   for (const InstanceConfig& instance : config.instances)
-    host.instances.push_back({instance.name, instance.core});
+    host.instances.push_back({.name = instance.name,
+                              .core = instance.core,
+                              .memory_limited = instance.memory_max_mib != 0,
+                              .pids_limited = instance.pids_max != 0});
   return host;
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "api/control/host_finding.hpp"
@@ -17,9 +18,18 @@ struct CheckedHost {
   struct Instance {
     std::string name;
     int core = -1;
+    bool memory_limited = false;  ///< by memory_max_mib
+    bool pids_limited = false;    ///< by pids_max
+  };
+  /// The control groups of the instances.
+  struct Groups {
+    std::string folder;
+    std::string problem;                                       ///< why there are none; empty: there are
+    std::vector<std::pair<std::string, std::string>> missing;  ///< controllers, and why
   };
   HostFiles files;
   std::vector<Instance> instances;
+  Groups groups = {};
   /// Tries SCHED_FIFO in this process: 0, or the error number.
   std::function<int()> try_fifo;
 };

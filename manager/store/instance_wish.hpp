@@ -37,7 +37,7 @@ struct InstanceWish {
   /// The configuration when this was written: a value that is another one now takes effect.
   std::string configured_application;
   std::string configured_scheduler;
-  std::string configured_process;  ///< core, priority band and settings file
+  std::string configured_process;  ///< core, priority band, limits and settings file
   bool safe_mode = false;
   StartKind start_kind = StartKind::first;  ///< of the next process
   std::uint32_t restarts = 0;

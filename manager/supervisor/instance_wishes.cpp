@@ -15,8 +15,13 @@ namespace plchost {
 
 namespace {
 
+// Without limits as versions before had it. The settings, a path, are last.
 std::string configured_process(const InstanceConfig& config) {
-  return fmt::format("{} {} {}", config.core, config.priority_band, config.settings).substr(0, kMaxWishText);
+  std::string text = fmt::format("{} {} ", config.core, config.priority_band);
+  if (config.memory_max_mib != 0) text += fmt::format("memory={} ", config.memory_max_mib);
+  if (config.pids_max != 0) text += fmt::format("pids={} ", config.pids_max);
+  if (config.oom_score != kInstanceOomScore) text += fmt::format("oom={} ", config.oom_score);
+  return (text + config.settings).substr(0, kMaxWishText);
 }
 
 }  // namespace
@@ -96,7 +101,7 @@ std::string ManagedInstance::awaited_changes() const {
   std::vector<std::string_view> changed;
   if (begun_with_.application != now.application) changed.emplace_back("application");
   if (begun_with_.scheduler != now.scheduler) changed.emplace_back("scheduler");
-  if (begun_with_.process != now.process) changed.emplace_back("core, priority band or settings");
+  if (begun_with_.process != now.process) changed.emplace_back("core, priority band, settings or limits");
   if (changed.empty() || removed_) return "";
   return fmt::format("the configuration has changed: {}; restart it to use that", fmt::join(changed, ", "));
 }

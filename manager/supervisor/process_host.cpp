@@ -29,7 +29,12 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   if (!output) {  // better a PLC whose words are not kept than none
     spdlog::warn("instance {}: its output is not kept: {}", settings_.name, output.error().describe());
   }
-  PLCHOST_TRY_ASSIGN(auto process, spawn_process({.arguments = to_arguments(settings_.program, options),
+  const Share share = settings_.share ? settings_.share() : Share{};
+  LaunchOptions launch = options;
+  launch.group = make_group(share.limits);
+  launch.oom_score = share.oom_score;
+  found_name_held_ = false;
+  PLCHOST_TRY_ASSIGN(auto process, spawn_process({.arguments = to_arguments(settings_.program, launch),
                                                   .report_fd = channel.childs.get(),
                                                   .output_fd = output ? output->get() : -1}));
   const int pid = process.pid;
@@ -43,6 +48,28 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   report_ = std::move(channel.ours);
   report_watch_ = std::move(*watch);
   return pid;
+}
+
+std::string ProcessHost::group_name() const {
+  return control_group_name(settings_.pool, settings_.name);
+}
+
+bool ProcessHost::name_is_held() const {
+  return user_that_holds(instance_claim_path(settings_.run_directory, settings_.name)).has_value();
+}
+
+// A process that ended while no manager ran may have left others in the group.
+std::string ProcessHost::make_group(const GroupLimits& limits) {
+  if (settings_.groups == nullptr || !settings_.groups->problem().empty()) return {};
+  if (!name_is_held()) settings_.groups->kill(group_name());
+  const auto made = settings_.groups->make(group_name(), limits);
+  if (!made) {
+    spdlog::warn("instance {}: its limits do not hold: {}", settings_.name, made.error().describe());
+    return {};
+  }
+  for (const std::string& refused : made->refused)
+    spdlog::warn("instance {}: a limit does not hold: {}", settings_.name, refused);
+  return made->folder;
 }
 
 Result<int> ProcessHost::adopt() {
@@ -123,6 +150,7 @@ void ProcessHost::read_reports() {
   read_output();
   take_packets(report_, report_watch_, [this](std::string_view packet) {
     if (const auto report = decode_report(packet)) {
+      found_name_held_ = found_name_held_ || report->code == ErrorCode::already_exists;
       events_->on_report(*report);
     } else {
       spdlog::warn("instance {}: {}", settings_.name, report.error().describe());
@@ -146,6 +174,9 @@ void ProcessHost::process_ended() {
   read_reports();
   read_replies();
   end_session(*process_);
+  // One that found its name held was put into the group of the process that has it.
+  const bool of_another = found_name_held_ && name_is_held();
+  if (settings_.groups != nullptr && !of_another) settings_.groups->end(group_name());
   output_.end(process_->pid);
   const ExitStatus status = reap_process(*process_);
   output_.say(status.success() ? LogLevel::info : LogLevel::warning, process_->pid,

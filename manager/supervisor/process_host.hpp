@@ -10,6 +10,7 @@
 #include "manager/supervisor/instance_output.hpp"
 #include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
+#include "manager/system/control_groups.hpp"
 #include "manager/system/reactor.hpp"
 #include "shm/sockets/packet_socket.hpp"
 
@@ -19,6 +20,11 @@ namespace plchost {
 /// Reactor. Every exit is reaped in one place, after the manager has read the last messages of the process.
 class ProcessHost : public InstanceHost {
  public:
+  /// The share of the host that a process may have.
+  struct Share {
+    GroupLimits limits;
+    std::optional<int> oom_score;  ///< nothing: that of the manager
+  };
   struct Settings {
     std::string program;  ///< path of plc-instance
     std::string name;
@@ -26,6 +32,10 @@ class ProcessHost : public InstanceHost {
     std::string run_directory;
     /// Before each start of a process; may be empty.
     std::function<void()> prepare = {};
+    /// The control groups of the host; none: its processes stay in that of the manager.
+    ControlGroups* groups = nullptr;
+    /// Of the next process; may be empty.
+    std::function<Share()> share = {};
   };
 
   ProcessHost(Reactor& reactor, Settings settings);
@@ -51,6 +61,11 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] std::string last_line() const override { return output_.last_line(); }
 
  private:
+  /// The folder of its control group; empty: it has none.
+  [[nodiscard]] std::string make_group(const GroupLimits& limits);
+  [[nodiscard]] std::string group_name() const;
+  /// A process has the instance's name; its group is not to be ended.
+  [[nodiscard]] bool name_is_held() const;
   /// Takes the process over if it can be watched.
   [[nodiscard]] Result<void> follow(ChildProcess& process);
   [[nodiscard]] Result<int> adopt_peer();
@@ -69,6 +84,7 @@ class ProcessHost : public InstanceHost {
   Reactor::Timer timer_;
 
   std::optional<ChildProcess> process_;
+  bool found_name_held_ = false;  // by its own report: another process has the name
   Reactor::Watch exit_watch_;
   PacketSocket report_;
   Reactor::Watch report_watch_;

@@ -93,6 +93,11 @@ void describe(CLI::App& app, Options& options) {
                  "Where retain variables are written; default: nowhere, they stay as long as the pool");
   app.add_option("--user", launch.user,
                  "Run as this user, with no other rights than a PLC needs; default: that of the caller");
+  app.add_option("--group", launch.group,
+                 "Folder of the control group to run in; default: that of the caller");
+  app.add_option("--oom-score", launch.oom_score,
+                 "The later the lower the kernel ends this process when memory is short (oom_score_adj)")
+      ->check(CLI::Range(-1000, 1000));
   app.add_option("--trusted-user", launch.trusted_users, "Numbers of other users that instances run as");
   app.add_flag("--no-debug", launch.no_debug, "Refuse an application that is a debug build");
   app.add_flag("--stopped", launch.stopped, "Load the application, do not start it");

@@ -95,7 +95,7 @@ Result<NameClaim> claim_name(const LaunchOptions& launch) {
   };
   NameClaim claim;
   if (!launch.run_directory.empty()) {
-    auto here = LockFile::take(fmt::format("{}/{}.claim", launch.run_directory, launch.name));
+    auto here = LockFile::take(instance_claim_path(launch.run_directory, launch.name));
     if (!here && here.error().code == ErrorCode::already_exists) return taken(here.error());
     if (!here) return failure_in("cannot claim the instance's name in the run directory", here.error());
     claim.in_run_directory.emplace(*std::move(here));

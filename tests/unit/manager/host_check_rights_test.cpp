@@ -134,5 +134,25 @@ TEST(HostCheckRights, FindAQuotaInAnyGroupAbove) {
   EXPECT_EQ(tree.look("cpu_quota").level, FindingLevel::warning);
 }
 
+TEST(HostCheckRights, NameTheLimitsOfInstancesThatDoNotHold) {
+  FakeTree tree;
+  tree.host.groups = {.folder = "/sys/fs/cgroup/a", .problem = "", .missing = {}};
+  tree.host.instances[0].memory_limited = true;
+  tree.host.instances[1].pids_limited = true;
+  EXPECT_EQ(tree.look("instance_limits").level, FindingLevel::ok);
+  EXPECT_EQ(tree.look("instance_limits").found, "/sys/fs/cgroup/a");
+  tree.host.groups.missing = {{"memory", "busy"}};
+  auto found = tree.look("instance_limits");
+  EXPECT_EQ(found.level, FindingLevel::warning);
+  EXPECT_EQ(found.found,
+            "/sys/fs/cgroup/a; without memory: busy; these limits do not hold: memory_max_mib of line1");
+  tree.host.groups = {.folder = "", .problem = "not there", .missing = {}};
+  found = tree.look("instance_limits");
+  EXPECT_EQ(found.found,
+            "none: not there; these limits do not hold: memory_max_mib of line1, pids_max of line2");
+  tree.host.instances = {{.name = "line1", .core = 1}};
+  EXPECT_EQ(tree.look("instance_limits").level, FindingLevel::note) << "nobody has asked for one";
+}
+
 }  // namespace
 }  // namespace plchost

@@ -1,12 +1,18 @@
 #include "manager/supervisor/process_host.hpp"
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include "shm/files/lock_file.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/process/dynamic_loader.hpp"
+#include "tests/support/group_folder.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -41,12 +47,23 @@ class ProcessHostTest : public ::testing::Test, public InstanceEvents {
     ASSERT_TRUE(reactor_->run());
   }
 
+  /// The script that plays the instance, in the group that it is told.
+  void run_in_group(const std::string& script) {
+    run("while [ \"$1\" != --group ]; do shift; done\necho 0 >\"$2/cgroup.procs\"\n" + script);
+  }
+
+  GroupFolder folder_of_groups_;
+  ControlGroups groups_ = ControlGroups::find(folder_of_groups_.path());
   std::string pool_ = own_name("host");
   std::filesystem::path folder_ = std::filesystem::temp_directory_path() / own_name("host");
   std::unique_ptr<Reactor> reactor_ = std::move(*Reactor::create());
-  ProcessHost sut_{
-      *reactor_,
-      {.program = folder_ / "plc-instance", .name = "line1", .pool = pool_, .run_directory = folder_}};
+  ProcessHost sut_{*reactor_,
+                   {.program = folder_ / "plc-instance",
+                    .name = "line1",
+                    .pool = pool_,
+                    .run_directory = folder_,
+                    .groups = &groups_,
+                    .share = [] { return ProcessHost::Share{.limits = {}, .oom_score = 300}; }}};
   ExitStatus end_;
   std::string said_;
 };
@@ -69,6 +86,45 @@ TEST_F(ProcessHostTest, TakesNoLineOfAnEarlierProcess) {
   EXPECT_EQ(said_, "first");
   run("exit 127");
   EXPECT_EQ(said_, "");
+}
+
+TEST_F(ProcessHostTest, EndsWhatAProcessHasLeftInItsGroup) {
+  if (!folder_of_groups_.there()) GTEST_SKIP() << kNoGroupFolder;
+  const std::string group = control_group_name(pool_, "line1");
+  run_in_group("setsid sleep 1000 >/dev/null 2>&1 & exit 0");
+  EXPECT_TRUE(folder_of_groups_.comes_to(group, 0));
+}
+
+// Else the process that has the name, and drives machines, would be ended with the one that is too many.
+TEST_F(ProcessHostTest, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
+  if (!folder_of_groups_.there()) GTEST_SKIP() << kNoGroupFolder;
+  const std::string group = control_group_name(pool_, "line1");
+  ASSERT_TRUE(groups_.make(group, {}));
+  const pid_t holder = ::fork();
+  if (holder == 0) {
+    std::ofstream(folder_of_groups_.path() + "/" + group + "/cgroup.procs") << 0;
+    const auto lock = LockFile::take(folder_ / "line1.claim");
+    if (lock) std::ofstream(folder_ / "held") << 1;
+    for (;;) ::pause();
+  }
+  for (int i = 0; i < 1000 && !std::filesystem::exists(folder_ / "held"); ++i) ::usleep(10'000);
+  const std::string taken =
+      encode(SetupReport{SetupStep::attach_pool, ErrorCode::already_exists, "x", false});
+  run_in_group("printf '%s' '" + taken + "' >&3\nexit 3");
+  EXPECT_TRUE(end_.exited_with(3));
+  EXPECT_EQ(folder_of_groups_.processes(group), 1);
+  ::kill(holder, SIGKILL);
+  ::waitpid(holder, nullptr, 0);
+  run_in_group("exit 0");
+  for (int i = 0; i < 1000 && !groups_.remove_ended(); ++i) ::usleep(10'000);
+  EXPECT_FALSE(folder_of_groups_.has(group));
+}
+
+TEST_F(ProcessHostTest, TellsAProcessItsOomScoreAndWithoutGroupsNoGroup) {
+  groups_ = ControlGroups::find("/no/such/folder");
+  run("echo \"$@\"");
+  EXPECT_TRUE(said_.contains(" --oom-score 300 ")) << said_;
+  EXPECT_FALSE(said_.contains("--group")) << said_;
 }
 
 }  // namespace

@@ -113,6 +113,14 @@ int plc_app_init() {
     for (;;) ::pause();
   }
 #endif
+#ifdef FAULT_LEAVES
+  // As a daemon does: in no session and no process group of the instance.
+  if (::fork() == 0) {
+    ::setsid();
+    if (::fork() != 0) ::_exit(0);
+    for (;;) ::pause();
+  }
+#endif
 #ifdef FAULT_THROWS
   throw std::runtime_error("no valve is connected");
 #endif

@@ -1,0 +1,27 @@
+#include "manager/system/oom_score.hpp"
+
+#include <algorithm>
+#include <fstream>
+
+namespace plchost {
+
+namespace {
+
+constexpr const char* kOomScore = "/proc/self/oom_score_adj";
+
+bool write_score(int score) {
+  std::ofstream file(kOomScore);
+  file << score << std::flush;
+  return file.good();
+}
+
+}  // namespace
+
+bool take_oom_score(int lowest, int own) noexcept {
+  int before = 0;
+  std::ifstream(kOomScore) >> before;
+  // The kernel remembers the lowest score that a right allowed; a higher one needs none and forgets nothing.
+  return write_score(lowest) && write_score(std::max(before, own));
+}
+
+}  // namespace plchost
