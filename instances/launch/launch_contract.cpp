@@ -86,7 +86,7 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
   if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
   if (!options.state_directory.empty()) add("--state-directory", options.state_directory);
   if (!options.user.empty()) add("--user", options.user);
-  if (!options.group.empty()) add("--group", options.group);
+  if (!options.control_group.empty()) add("--control-group", options.control_group);
   if (options.oom_score) add("--oom-score", std::to_string(*options.oom_score));
   for (const unsigned user : options.trusted_users) add("--trusted-user", std::to_string(user));
   if (options.no_debug) arguments.emplace_back("--no-debug");

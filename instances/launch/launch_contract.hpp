@@ -38,7 +38,7 @@ struct LaunchOptions {
   std::string run_directory;     ///< --run-directory DIR; empty: no control socket (by hand)
   std::string state_directory;  ///< --state-directory DIR: for what outlives a power cut; empty: nothing does
   std::string user;             ///< --user NAME or number; empty: that of the caller
-  std::string group;            ///< --group DIR: the control group to run in; empty: that of the caller
+  std::string control_group;  ///< --control-group DIR: the control group to run in; empty: that of the caller
   std::optional<int> oom_score;             ///< --oom-score N: oom_score_adj; nothing: that of the caller
   std::vector<unsigned> trusted_users;      ///< --trusted-user N: their pages are those of instances, too
   bool no_debug = false;                    ///< --no-debug: an application that is a debug build is refused

@@ -31,7 +31,7 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   }
   const Share share = settings_.share ? settings_.share() : Share{};
   LaunchOptions launch = options;
-  launch.group = make_group(share.limits);
+  launch.control_group = make_group(share.limits);
   launch.oom_score = share.oom_score;
   found_name_held_ = false;
   PLCHOST_TRY_ASSIGN(auto process, spawn_process({.arguments = to_arguments(settings_.program, launch),
@@ -168,17 +168,27 @@ void ProcessHost::read_replies() {
   });
 }
 
+// All that is left in it. Whether the kernel has ended a process there for want of memory.
+bool ProcessHost::end_group() {
+  // One that found its name held was put into the group of the process that has it.
+  if (settings_.groups == nullptr || (found_name_held_ && name_is_held())) return false;
+  const bool out_of_memory = settings_.groups->was_out_of_memory(group_name());
+  settings_.groups->end(group_name());
+  return out_of_memory;
+}
+
 // The one place where an instance's exit is reaped. Its last report explains the exit, so it comes first.
 void ProcessHost::process_ended() {
   end_outputs();  // first: machines wait for it
   read_reports();
   read_replies();
   end_session(*process_);
-  // One that found its name held was put into the group of the process that has it.
-  const bool of_another = found_name_held_ && name_is_held();
-  if (settings_.groups != nullptr && !of_another) settings_.groups->end(group_name());
+  const bool out_of_memory = end_group();
   output_.end(process_->pid);
-  const ExitStatus status = reap_process(*process_);
+  ExitStatus status = reap_process(*process_);
+  // Else the kernel has ended a child of the application earlier.
+  const bool by_kernel = status.kind == ExitStatus::Kind::killed && status.value == SIGKILL;
+  status.out_of_memory = out_of_memory && (by_kernel || !status.known);
   output_.say(status.success() ? LogLevel::info : LogLevel::warning, process_->pid,
               fmt::format("process {}: {}", process_->pid, status.describe()));
   spdlog::info("instance {}: process {}: {}", settings_.name, process_->pid, status.describe());

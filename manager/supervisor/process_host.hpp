@@ -63,6 +63,7 @@ class ProcessHost : public InstanceHost {
  private:
   /// The folder of its control group; empty: it has none.
   [[nodiscard]] std::string make_group(const GroupLimits& limits);
+  [[nodiscard]] bool end_group();
   [[nodiscard]] std::string group_name() const;
   /// A process has the instance's name; its group is not to be ended.
   [[nodiscard]] bool name_is_held() const;

@@ -141,6 +141,7 @@ void kill_session(pid_t leader) noexcept {
 }  // namespace
 
 std::string ExitStatus::describe() const {
+  if (out_of_memory) return "ended by the kernel, out of memory: memory_max_mib, or the host has no more";
   if (!known) return "ended (status unknown: it was adopted)";
   if (kind == Kind::exited) return fmt::format("exit code {}", value);
   const char* name = sigabbrev_np(value);

@@ -16,8 +16,9 @@ namespace plchost {
 struct ExitStatus {
   enum class Kind : bool { exited, killed };
   Kind kind = Kind::exited;
-  int value = 0;      ///< exit code, or number of the signal
-  bool known = true;  ///< false: it was no child of this manager
+  int value = 0;               ///< exit code, or number of the signal
+  bool known = true;           ///< false: it was no child of this manager
+  bool out_of_memory = false;  ///< the kernel has ended it, or another of its group, for that
   [[nodiscard]] bool exited_with(int code) const noexcept {
     return known && kind == Kind::exited && value == code;
   }

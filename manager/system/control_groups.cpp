@@ -123,6 +123,15 @@ std::string groups_beside(std::string_view mount, std::string_view own) {
   return fmt::format("{}{}/{}", mount, own.substr(0, own.rfind('/')), kUnitOfGroups);
 }
 
+bool tells_oom_kill(std::string_view text) {
+  std::istringstream words{std::string(text)};
+  std::string what;
+  for (std::uint64_t times = 0; words >> what >> times;) {
+    if (what == "oom_kill") return times != 0;
+  }
+  return false;
+}
+
 std::string control_group_name(std::string_view pool, std::string_view instance) {
   return fmt::format("{}.instance.{}", pool, instance);
 }
@@ -175,6 +184,7 @@ Result<ControlGroups::Made> ControlGroups::make(const std::string& name, const G
   std::erase(ended_, name);
   // Each time: systemd takes them back when somebody starts the unit of the groups anew.
   enable_controllers();
+  (void)::rmdir(made.folder.c_str());  // an empty one: its counters are those of an earlier process
   constexpr mode_t kMode = 0755;
   if (::mkdir(made.folder.c_str(), kMode) != 0 && errno != EEXIST)
     return failure(ErrorCode::system, "cannot make the control group " + made.folder, errno);
@@ -190,6 +200,10 @@ Result<ControlGroups::Made> ControlGroups::make(const std::string& name, const G
 
 void ControlGroups::kill(const std::string& name) const noexcept {
   if (problem_.empty()) (void)write_into(path(name) + "/cgroup.kill", "1");
+}
+
+bool ControlGroups::was_out_of_memory(const std::string& name) const {
+  return problem_.empty() && tells_oom_kill(text_of_file(path(name) + "/memory.events"));
 }
 
 void ControlGroups::end(const std::string& name) {

@@ -17,6 +17,8 @@ namespace plchost {
 /// The folder of plchost-instances.service beside the unit that the process is in; empty: it is in no unit.
 [[nodiscard]] std::string groups_beside(std::string_view mount, std::string_view own);
 
+/// Whether the kernel has ended a process for want of memory. `text`: of memory.events.
+[[nodiscard]] bool tells_oom_kill(std::string_view text);
 /// The group of an instance in the folder of groups, as its page is called in /dev/shm.
 [[nodiscard]] std::string control_group_name(std::string_view pool, std::string_view instance);
 
@@ -53,7 +55,9 @@ class ControlGroups {
   [[nodiscard]] Result<Made> make(const std::string& name, const GroupLimits& limits);
   /// SIGKILL to all processes in a group at once, also to those that are just being forked.
   void kill(const std::string& name) const noexcept;
-  /// The same, and the group goes when the last of them has ended.
+  /// Whether the kernel has ended a process of the group for want of memory, since it was made.
+  [[nodiscard]] bool was_out_of_memory(const std::string& name) const;
+  /// Ends all processes as kill() does, and the group goes when the last of them has ended.
   void end(const std::string& name);
   /// Removes groups that have ended. To be called periodically. True: none is left to remove.
   bool remove_ended();

@@ -97,6 +97,8 @@ settings = "/applications/line.cfg"
 name = "line2"
 core = 1
 share_core = true
+memory_max_mib = 512
+pids_max = 200
 application = "/applications/bottling_line.so"
 settings = "/applications/line.cfg"
 
@@ -232,6 +234,34 @@ for file in /run/plchost/manager.sock /run/plchost/line1.sock /dev/shm/plchost /
   ! on_machine setpriv --reuid 65534 --regid 65534 --clear-groups test -w "$file" || fail "everybody can write $file"
 done
 
+story "each instance has a control group of its own, with its limits"
+groups=/sys/fs/cgroup/system.slice/plchost-instances.service
+process_of() { plcctl list instances --json | jq -r ".[] | select(.name == \"$1\") | .pid"; }
+limits_of_line2() { on_machine sh -c 'cd "$1" && paste -sd" " memory.max memory.oom.group pids.max' _ "$groups/plchost.instance.line2"; }
+# in_group PROGRAM...: in the group of line2
+in_group() { on_machine sh -c 'echo 0 >"$0/cgroup.procs" && exec "$@"' "$groups/plchost.instance.line2" "$@"; }
+if on_machine test -e /sys/fs/cgroup/cgroup.controllers; then
+  for name in line1 line2 valves; do
+    group=$(on_machine cat "/proc/$(process_of "$name")/cgroup")
+    [ "$group" = "0::/system.slice/plchost-instances.service/plchost.instance.$name" ] || fail "$name is in $group"
+  done
+  [ "$(limits_of_line2)" = "536870912 1 200" ] || fail "the limits of line2: $(limits_of_line2)"
+  scores=$(on_machine sh -c 'for name in plchostd plc-instance; do cat "/proc/$(pgrep -o -x "$name")/oom_score_adj"; done' | paste -sd' ')
+  [ "$scores" = "-900 -950" ] || fail "the OOM scores: $scores"
+  left=$(in_group sh -c 'setsid sleep 1000 >/dev/null 2>&1 & echo $!')
+  other=$(process_of line1) first=$(process_of line2)
+  in_group python3 -c 'b"x" * (1 << 30)' >"$log" 2>&1 && fail "a process of line2 has a GiB"
+  has_begun_anew() { [ "$(process_of line2)" != "$first" ] && run; }
+  until_true 60 has_begun_anew
+  ! on_machine test -e "/proc/$left" || fail "a process of line2 has outlived it"
+  [[ $(plcctl list instances --json | jq -r '.[] | select(.name == "line2") | .problem') == *"out of memory: memory_max_mib"* ]] ||
+    fail "the problem of line2: $(plcctl list instances --json)"
+  [ "$(process_of line1)" = "$other" ] || fail "line1 has ended with it"
+  shown=$(instances)
+else
+  echo "  this container has no control groups of version 2"
+fi
+
 story "a restart of the service, an upgrade, a kill and a stop of the manager's process end none of them"
 ends_no_plc "systemctl restart" on_machine systemctl restart plchostd
 ends_no_plc "an upgrade" on_machine sh -c 'apt-get -q install -y --reinstall /packages/*.deb'
@@ -239,6 +269,9 @@ ends_no_plc "a kill of the manager" on_machine systemctl kill --kill-who=main -s
 ends_no_plc "a manager that stands still" on_machine systemctl kill --kill-who=main -s STOP plchostd
 
 [ "$(registers)" = "$driven" ] || fail "outputs have not been driven all along: $(registers)"
+if on_machine test -e /sys/fs/cgroup/cgroup.controllers; then
+  [ "$(limits_of_line2)" = "536870912 1 200" ] || fail "the limits of line2 after restarts: $(limits_of_line2)"
+fi
 
 if [ -n "$before" ]; then
   story "the way back to the packages of a version before, and the upgrade from them, end none of them"
@@ -250,12 +283,12 @@ if [ -n "$before" ]; then
     shown=$(instances)
     for name in line1 line2 valves; do [ "$(user_of "$name")" = "$2" ] || fail "$1: $name is of user $(user_of "$name")"; done
   }
-  # A version before may not know the key.
-  on_machine sed -i 's/^instance_user/# &/' /etc/plchost/plchost.toml
+  # A version before may not know the keys.
+  on_machine sed -Ei 's/^(instance_user|memory_max_mib|pids_max)/# &/' /etc/plchost/plchost.toml
   restart_all "a restart without instance_user" 0
   ends_no_plc "the packages before" on_machine sh -c 'dpkg -i --force-confold --force-downgrade /applications/before/*.deb'
   ends_no_plc "an upgrade from them" on_machine sh -c 'dpkg -i --force-confold /packages/*.deb'
-  on_machine sed -i 's/^# instance_user/instance_user/' /etc/plchost/plchost.toml
+  on_machine sed -Ei 's/^# (instance_user|memory_max_mib|pids_max)/\1/' /etc/plchost/plchost.toml
   restart_all "a restart with instance_user" "$owner"
   until_true 20 registers_are "$driven"
 fi
@@ -269,6 +302,8 @@ order=$(on_machine journalctl -q --no-pager -u plchostd --since "@$since" -o cat
 [ "$order" = "valves stopping,valves offline,line1 stopping,line1 offline" ] || fail "the order of a stop: $order"
 [ "$(on_machine pgrep -c plc-instance)" = 0 ] || fail "instances run on after a stop"
 [ -z "$(on_machine ls /dev/shm)" ] || fail "left in /dev/shm: $(on_machine ls /dev/shm)"
+has_no_groups() { ! on_machine test -e "$groups"; }
+until_true 20 has_no_groups
 
 story "files of another user under its names are taken away and told, and it starts"
 on_machine setpriv --reuid 65534 --regid 65534 --clear-groups sh -c 'umask 0; for name in host posts instance.line1; do echo planted >"/dev/shm/plchost.$name"; done'

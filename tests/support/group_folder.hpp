@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -7,6 +8,7 @@
 #include <thread>
 
 #include "manager/system/control_groups.hpp"
+#include "tests/support/in_a_child.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -22,12 +24,11 @@ class GroupFolder {
     std::error_code error;
     if (mount.empty()) return;
     path_ = std::filesystem::path(mount) / own_name("groups");
-    there_ = std::filesystem::create_directory(path_, error);
-    // A process must be allowed to come in from the group of this one.
-    if (there_) there_ = std::filesystem::exists(path_ / "cgroup.kill", error) && can_move_into(path_);
+    made_ = std::filesystem::create_directory(path_, error);
+    there_ = made_ && std::filesystem::exists(path_ / "cgroup.kill", error) && can_be_entered();
   }
   ~GroupFolder() {
-    if (!there_) return;
+    if (!made_) return;
     std::ofstream(path_ / "cgroup.kill") << 1;
     for (int i = 0; i < 200 && !remove(path_); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -59,9 +60,13 @@ class GroupFolder {
   }
 
  private:
-  static bool can_move_into(const std::filesystem::path& folder) {
-    return std::system(
-               ("/bin/sh -c 'echo 0 2>/dev/null >" + (folder / "cgroup.procs").string() + "'").c_str()) == 0;
+  // From the group of this process: in a container that may be refused.
+  [[nodiscard]] bool can_be_entered() const {
+    return in_a_child([this] {
+             std::ofstream file(path_ / "cgroup.procs");
+             file << 0 << std::flush;
+             return std::string(file.good() ? "yes" : "no");
+           }) == "yes";
   }
   static bool remove(const std::filesystem::path& folder) {
     std::error_code error;
@@ -74,6 +79,7 @@ class GroupFolder {
   }
 
   std::filesystem::path path_;
+  bool made_ = false;
   bool there_ = false;
 };
 

@@ -93,7 +93,7 @@ void describe(CLI::App& app, Options& options) {
                  "Where retain variables are written; default: nowhere, they stay as long as the pool");
   app.add_option("--user", launch.user,
                  "Run as this user, with no other rights than a PLC needs; default: that of the caller");
-  app.add_option("--group", launch.group,
+  app.add_option("--control-group", launch.control_group,
                  "Folder of the control group to run in; default: that of the caller");
   app.add_option("--oom-score", launch.oom_score,
                  "The later the lower the kernel ends this process when memory is short (oom_score_adj)")

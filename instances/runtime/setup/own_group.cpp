@@ -26,8 +26,8 @@ Result<void> tell_kernel(const std::string& path, std::string_view text) {
 std::string take_own_group(const LaunchOptions& launch) {
   constexpr std::string_view kThisProcess = "0";
   std::string refused;
-  if (!launch.group.empty()) {
-    const auto moved = tell_kernel(launch.group + "/cgroup.procs", kThisProcess);
+  if (!launch.control_group.empty()) {
+    const auto moved = tell_kernel(launch.control_group + "/cgroup.procs", kThisProcess);
     if (!moved)
       refused = fmt::format("it runs in the manager's control group, without limits of its own: {}",
                             moved.error().describe());

@@ -30,7 +30,7 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
                               .run_directory = "/run/plant",
                               .state_directory = "/var/lib/plant",
                               .user = "plc",
-                              .group = "/sys/fs/cgroup/a/line1",
+                              .control_group = "/sys/fs/cgroup/a/line1",
                               .oom_score = -950,
                               .trusted_users = {7, 8},
                               .stopped = true,
@@ -50,7 +50,7 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
   EXPECT_EQ(sut.run_directory, "/run/plant");
   EXPECT_EQ(sut.state_directory, "/var/lib/plant");
   EXPECT_EQ(sut.user, "plc");
-  EXPECT_EQ(sut.group, "/sys/fs/cgroup/a/line1");
+  EXPECT_EQ(sut.control_group, "/sys/fs/cgroup/a/line1");
   EXPECT_EQ(sut.oom_score, -950);
   EXPECT_THAT(sut.trusted_users, ElementsAre(7, 8));
   EXPECT_TRUE(sut.stopped);

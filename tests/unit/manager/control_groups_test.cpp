@@ -1,20 +1,21 @@
 #include "manager/system/control_groups.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "manager/system/child_process.hpp"
 #include "tests/support/group_folder.hpp"
-#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::SizeIs;
 
 TEST(ControlGroupTexts, TellTheOwnGroupOfVersion2) {
   EXPECT_EQ(own_control_group("9:name=systemd:/a\n4:memory:/b\n0::/system.slice/plchostd.service\n"),
@@ -60,6 +61,12 @@ TEST(ControlGroupsOfNobody, SayWhyThereAreNone) {
   EXPECT_FALSE(std::filesystem::exists(plain / "line1"));
 }
 
+TEST(ControlGroupTexts, TellWhetherMemoryWasShort) {
+  EXPECT_FALSE(tells_oom_kill("low 0\nhigh 0\nmax 7\noom 3\noom_kill 0\noom_group_kill 0\n"));
+  EXPECT_TRUE(tells_oom_kill("low 0\nmax 7\noom 3\noom_kill 2\noom_group_kill 1\n"));
+  EXPECT_FALSE(tells_oom_kill(""));
+}
+
 class ControlGroupsTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -70,7 +77,7 @@ class ControlGroupsTest : public testing::Test {
   /// Runs a script in the group.
   Result<ChildProcess> run_in(const std::string& group, const std::string& script) {
     return spawn_process(
-        {.arguments = {"/bin/sh", "-c", fmt::format("echo 0 >{}/cgroup.procs && {}", group, script)}});
+        {.arguments = {"/bin/sh", "-c", fmt::format("echo 0 >{}/cgroup.procs\n{}", group, script)}});
   }
   [[nodiscard]] bool lacks(std::string_view controller) const {
     return std::ranges::any_of(sut_.missing(), [&](const auto& one) { return one.controller == controller; });

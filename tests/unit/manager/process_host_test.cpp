@@ -49,7 +49,7 @@ class ProcessHostTest : public ::testing::Test, public InstanceEvents {
 
   /// The script that plays the instance, in the group that it is told.
   void run_in_group(const std::string& script) {
-    run("while [ \"$1\" != --group ]; do shift; done\necho 0 >\"$2/cgroup.procs\"\n" + script);
+    run("while [ \"$1\" != --control-group ]; do shift; done\necho 0 >\"$2/cgroup.procs\"\n" + script);
   }
 
   GroupFolder folder_of_groups_;
@@ -88,16 +88,22 @@ TEST_F(ProcessHostTest, TakesNoLineOfAnEarlierProcess) {
   EXPECT_EQ(said_, "");
 }
 
-TEST_F(ProcessHostTest, EndsWhatAProcessHasLeftInItsGroup) {
-  if (!folder_of_groups_.there()) GTEST_SKIP() << kNoGroupFolder;
+class ProcessHostWithGroups : public ProcessHostTest {
+ protected:
+  void SetUp() override {
+    if (!folder_of_groups_.there()) GTEST_SKIP() << kNoGroupFolder;
+  }
+};
+
+TEST_F(ProcessHostWithGroups, EndsWhatAProcessHasLeftInItsGroup) {
   const std::string group = control_group_name(pool_, "line1");
   run_in_group("setsid sleep 1000 >/dev/null 2>&1 & exit 0");
+  EXPECT_TRUE(end_.success()) << end_.describe();
   EXPECT_TRUE(folder_of_groups_.comes_to(group, 0));
 }
 
 // Else the process that has the name, and drives machines, would be ended with the one that is too many.
-TEST_F(ProcessHostTest, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
-  if (!folder_of_groups_.there()) GTEST_SKIP() << kNoGroupFolder;
+TEST_F(ProcessHostWithGroups, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
   const std::string group = control_group_name(pool_, "line1");
   ASSERT_TRUE(groups_.make(group, {}));
   const pid_t holder = ::fork();
@@ -124,7 +130,7 @@ TEST_F(ProcessHostTest, TellsAProcessItsOomScoreAndWithoutGroupsNoGroup) {
   groups_ = ControlGroups::find("/no/such/folder");
   run("echo \"$@\"");
   EXPECT_TRUE(said_.contains(" --oom-score 300 ")) << said_;
-  EXPECT_FALSE(said_.contains("--group")) << said_;
+  EXPECT_FALSE(said_.contains("--control-group")) << said_;
 }
 
 }  // namespace
