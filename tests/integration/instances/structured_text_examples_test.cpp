@@ -72,11 +72,13 @@ out := sum.total;]]></xhtml:p>
 </project>
 )";
 
-class StructuredTextExample : public ::testing::Test {
+/// Built by each compiler.
+class StructuredTextExample : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    if (std::getenv("PLCHOST_MATIEC") == nullptr)  // NOLINT(concurrency-mt-unsafe)
-      GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+    const char* const variable = GetParam() == "matiec" ? "PLCHOST_MATIEC" : "PLCHOST_STRUCPP";
+    const char* const folder = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe)
+    if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "needs " << GetParam();
   }
   ~StructuredTextExample() override {
     plc_image_close(&inputs_);
@@ -86,7 +88,8 @@ class StructuredTextExample : public ::testing::Test {
   }
 
   [[nodiscard]] ProgramEnd build(const std::string& source) const {
-    return run_program({PLCCTL, "build", "application", source, "-o", sandbox.folder() + "/it.so"},
+    return run_program({PLCCTL, "build", "application", source, "-o", sandbox.folder() + "/it.so",
+                        "--compiler", GetParam()},
                        sandbox.folder())
         .value();
   }
@@ -132,7 +135,7 @@ class StructuredTextExample : public ::testing::Test {
   plc_image outputs_{};
 };
 
-TEST_F(StructuredTextExample, TheTrafficLightLetsPeopleWalkWhenTheyAsk) {
+TEST_P(StructuredTextExample, TheTrafficLightLetsPeopleWalkWhenTheyAsk) {
   ASSERT_NO_FATAL_FAILURE(start("traffic_light", "lights"));
   constexpr int kRed = 1, kGreen = 4, kWalk = 8, kWait = 16;
   EXPECT_TRUE(eventually([&] { return outputs()[0] == kGreen; }));
@@ -143,7 +146,7 @@ TEST_F(StructuredTextExample, TheTrafficLightLetsPeopleWalkWhenTheyAsk) {
   EXPECT_TRUE(eventually([&] { return outputs()[0] == kGreen && word(1) == 1; }));
 }
 
-TEST_F(StructuredTextExample, TheTemperatureLoopReachesItsSetPoint) {
+TEST_P(StructuredTextExample, TheTemperatureLoopReachesItsSetPoint) {
   ASSERT_NO_FATAL_FAILURE(start("temperature", "vessel"));
   put(0, 300, 0);
   EXPECT_TRUE(eventually([&] { return word(1) > 0; })) << "the heater";
@@ -152,7 +155,7 @@ TEST_F(StructuredTextExample, TheTemperatureLoopReachesItsSetPoint) {
   EXPECT_LT(word(0), 310);
 }
 
-TEST_F(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
+TEST_P(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
   ASSERT_NO_FATAL_FAILURE(start("packing", "packing"));
   constexpr std::uint8_t kStop = 1, kEnable = 2, kAcknowledge = 4;
   constexpr int kMotor = 1, kFault = 2;
@@ -171,7 +174,7 @@ TEST_F(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
   EXPECT_EQ(word(2), 25);
 }
 
-TEST_F(StructuredTextExample, AProjectOfPlcopenRunsAsItIsWritten) {
+TEST_P(StructuredTextExample, AProjectOfPlcopenRunsAsItIsWritten) {
   const ProgramEnd built = build(sandbox.write("project.xml", kProject));
   ASSERT_TRUE(built.success()) << built.output;
   ASSERT_NO_FATAL_FAILURE(run(std::string(EXAMPLES) + "/packing/packing.cfg", "packing"));
@@ -179,7 +182,7 @@ TEST_F(StructuredTextExample, AProjectOfPlcopenRunsAsItIsWritten) {
   EXPECT_TRUE(eventually([&] { return word(1) == 22; }));
 }
 
-TEST_F(StructuredTextExample, AProjectOfPlcopenThatIsWrongIsToldByItsPouAndLine) {
+TEST_P(StructuredTextExample, AProjectOfPlcopenThatIsWrongIsToldByItsPouAndLine) {
   std::string text = kProject;
   text.replace(text.find("raw * factor"), 12, "row * factor");
   EXPECT_THAT(build(sandbox.write("project.xml", text)).output,
@@ -189,6 +192,9 @@ TEST_F(StructuredTextExample, AProjectOfPlcopenThatIsWrongIsToldByItsPouAndLine)
   EXPECT_THAT(build(sandbox.write("project.xml", text)).output,
               HasSubstr("Main, line 5 of its body, column "));
 }
+
+INSTANTIATE_TEST_SUITE_P(By, StructuredTextExample, ::testing::Values("matiec", "strucpp"),
+                         [](const auto& info) { return info.param; });
 
 }  // namespace
 }  // namespace plchost::testing

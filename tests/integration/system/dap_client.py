@@ -206,7 +206,16 @@ def text(port, source):
     client.ask("next", threadId=main)
     client.event("stopped")
     assert client.ask("evaluate", expression="press1.doubled")["result"] == "2004"
+
+    assert client.ask("continue", threadId=main)["allThreadsContinued"] is False
+    hit = client.event("stopped")
+    assert hit["reason"] == "breakpoint" and hit["threadId"] == main, hit
+    frames = stack(client, main)
+    assert [(one["name"].lower(), one["line"]) for one in frames] == [("counter", 12), ("press", 19)], frames
+    assert client.ask("evaluate", expression="n", frameId=frames[0]["id"])["result"] == "1001", "the cycle has not gone on"
     client.ask("setBreakpoints", source={"path": source}, breakpoints=[])
+    assert client.ask("continue", threadId=main)["allThreadsContinued"] is False
+    client.ask("stepIn", expect=False, threadId=main)  # it runs
     client.ask("disconnect")
 
 

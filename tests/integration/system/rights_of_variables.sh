@@ -28,7 +28,11 @@ for who in panel anna; do
   refused "this takes the role engineer ([host] read_variables of this host says so)" as "$who" read variable line1 line.setpoint
   refused "[host] read_variables" as "$who" list variables line1
   refused "[host] read_variables" as "$who" watch variables line1 line.setpoint --count 1
+  refused "[host] read_variables" as "$who" record variables line1 line.setpoint --duration 0.1 --file "$cell/$who.csv"
+  ! grep -q '[0-9]' "$cell/$who.csv" 2>/dev/null || fail "values without the right to them: $(cat "$cell/$who.csv")"
 done
+records() { asked as "$1" record variables line1 line.setpoint --duration 0.1 | tail -n 1 | cut -d, -f4; }
+is "$(records otto)" 21 || fail "an engineer records $(records otto)"
 code=0
 as panel export plant >"$cell/plant.xml" 2>"$cell/export.log" || code=$?
 is "$code" 1 || fail "exit code $code of an export without the right to read variables"
@@ -65,6 +69,7 @@ sed -i '/^pool = /a read_variables = "viewer"\nwrite_variables = "operator"' "$c
 as otto reload host | grep -q '^\[host\] read_variables changed, used at once; plchost-dds is restarted' || fail "the answer of the reload"
 reads() { is "$(value panel line.setpoint)" 21; }
 until_true 20 reads
+is "$(records panel)" 21 || fail "a viewer records $(records panel)"
 as anna write variable line1 line.setpoint=23
 as anna force variable line1 line.total=8
 is "$(value panel line.total)" 8 || fail "$(value panel line.total)"
