@@ -66,6 +66,17 @@ pkill -KILL -P $! 2>/dev/null || kill -KILL $!
 until_true 30 runs_on
 plcctl logs line1 | grep -q 'its debugger was silent for 10 s' || fail "$(plcctl logs line1)"
 
+echo "- where the host allows no debug builds, none is loaded"
+sed -i '/^pool = /a allow_debug = false' "$cell/cell.toml"
+refused "line1' application: $APPLICATIONS/steps.so is a debug build" plcctl reload host
+sed -i 's/steps\.so/bottling_line.so/' "$cell/cell.toml"
+plcctl reload host >"$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
+grep -q '^\[host\] allow_debug changed' "$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
+pid=$(instance line2 pid)
+refused "allow_debug = false" plcctl load application line2 "$APPLICATIONS/steps.so"
+until_true 20 state_is line2 running
+is "$(instance line2 pid)" "$pid" || fail "line2 was restarted"
+
 kill -TERM "${managers[-1]}"
 wait "${managers[-1]}" || fail "the manager ended with $?"
 managers=()
