@@ -362,7 +362,8 @@ class Application {
 
   /// A variable that can be seen from outside by its name, and written and forced unless it is const. It may
   /// be a number, a bool, std::chrono::nanoseconds (TIME), characters (STRING), an std::atomic of those, or
-  /// an array. An array's dimensions are counted from options.first. Static, or as long-lived.
+  /// an array. An array's dimensions are counted from options.first. BYTE to LWORD, DATE, TOD and DT are
+  /// options.type of an integer. Static, or as long-lived.
   template <class T>
   void variable(const std::string& name, T& variable, const VariableOptions& options = {}) {
     Plc_Variable declared{};
@@ -373,6 +374,7 @@ class Application {
       declared.aDimensions[i].nFirst = options.first;
       if (name.find('[') == std::string::npos) full += "[]";
     }
+    if (options.type != 0) declared.dwType = options.type;
     declared.pszName = full.c_str();
     declared.dwFlags = options.read_only || std::is_const_v<T> ? PLC_VARIABLE_READ_ONLY : 0;
     declared.pAddress = const_cast<void*>(static_cast<const volatile void*>(&variable));

@@ -78,7 +78,7 @@ typedef struct {
   unsigned int dwType;  /* PLC_TYPE_..., of one element */
   unsigned int dwFlags; /* PLC_VARIABLE_..., or 0 */
   void* pAddress;       /* of the variable, or of an array's first element. It is valid until plc_app_exit */
-  unsigned int dwBytes; /* strings: of one element's memory; others: 0 */
+  unsigned int dwBytes; /* strings: of one element's memory; others: 0, or that of the type */
   unsigned int nDimensions; /* as many as the name has "[]" */
   Plc_Dimension aDimensions[PLC_MAX_DIMENSIONS];
   const char* pszTask; /* the only task whose cycles use it; null: any */
@@ -96,15 +96,35 @@ RTS_RESULT CDECL plc_declare_variable(const Plc_Variable* pVariable);
  * that function calls it behind the one and before the other. Any, real-time. */
 void CDECL plc_apply_forces(void);
 
-/* Declares a variable that is no array and no string. */
-#define PLC_DECLARE_VARIABLE(name, type, variable)                                            \
-  do {                                                                                        \
-    Plc_Variable plc_declared_ = {sizeof(Plc_Variable), 0, 0, 0, 0, 0, 0, {{0, 0, 0}}, 0, 0}; \
-    plc_declared_.pszName = (name);                                                           \
-    plc_declared_.dwType = (type);                                                            \
-    plc_declared_.pAddress = &(variable);                                                     \
-    plc_declare_variable(&plc_declared_);                                                     \
+/* The macros declare a variable that any task may use. The log says why one is refused. */
+#define PLC_DECLARE_VARIABLE_(name, type, address, bytes, dimensions, first, count, stride) \
+  do {                                                                                      \
+    Plc_Variable plc_declared_ = {                                                          \
+        sizeof(Plc_Variable), 0, 0, 0, 0, 0, 0, {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, 0, 0};   \
+    plc_declared_.pszName = (name);                                                         \
+    plc_declared_.dwType = (type);                                                          \
+    plc_declared_.pAddress = (address);                                                     \
+    plc_declared_.dwBytes = (bytes);                                                        \
+    plc_declared_.nDimensions = (dimensions);                                               \
+    plc_declared_.aDimensions[0].nFirst = (first);                                          \
+    plc_declared_.aDimensions[0].nCount = (count);                                          \
+    plc_declared_.aDimensions[0].dwStride = (stride);                                       \
+    plc_declare_variable(&plc_declared_);                                                   \
   } while (0)
+
+/* A variable that is no array and no string. */
+#define PLC_DECLARE_VARIABLE(name, type, variable) \
+  PLC_DECLARE_VARIABLE_(name, type, &(variable), 0, 0, 0, 0, 0)
+
+/* An array of one dimension whose elements are no strings: PLC_DECLARE_ARRAY("Line.speed[]", PLC_TYPE_INT,
+ * speed, 1) is "Line.speed[1]" and those behind it. */
+#define PLC_DECLARE_ARRAY(name, type, array, first)                            \
+  PLC_DECLARE_VARIABLE_(name, type, &(array)[0], sizeof((array)[0]), 1, first, \
+                        sizeof(array) / sizeof((array)[0]), sizeof((array)[0]))
+
+/* An array of characters, whose text is ended by a zero. */
+#define PLC_DECLARE_STRING(name, characters) \
+  PLC_DECLARE_VARIABLE_(name, PLC_TYPE_STRING, &(characters)[0], sizeof(characters), 0, 0, 0, 0)
 
 #ifdef __cplusplus
 }

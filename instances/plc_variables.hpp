@@ -20,6 +20,7 @@ struct VariableOptions {
   std::string area = {};   ///< for people: "%QX0.1"
   bool read_only = false;  ///< a const variable always is
   int first = 0;           ///< index of an array's first element, of each dimension
+  unsigned type = 0;  ///< PLC_TYPE_... of the same size, such as PLC_TYPE_WORD; 0: that of its type in C++
 };
 
 namespace detail {
@@ -43,7 +44,10 @@ template <class T>
 struct VariableLayout {
   static_assert(variable_type<T>() != 0,
                 "a variable is a number, a bool, an array of characters, or an array of these");
-  static void fill(Plc_Variable& variable) { variable.dwType = variable_type<T>(); }
+  static void fill(Plc_Variable& variable) {
+    variable.dwType = variable_type<T>();
+    variable.dwBytes = sizeof(T);
+  }
 };
 template <class T>
 struct VariableLayout<const T> : VariableLayout<T> {};

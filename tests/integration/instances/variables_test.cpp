@@ -48,11 +48,12 @@ class Variables : public ::testing::Test {
 };
 
 TEST_F(Variables, OfEachTypeAreRead) {
-  EXPECT_EQ(client_->table().symbols().size(), 23);
-  EXPECT_EQ(process_->runtime().variables, 23);
+  EXPECT_EQ(client_->table().symbols().size(), 26);
+  EXPECT_EQ(process_->runtime().variables, 26);
   EXPECT_EQ(process_->runtime().forces, 0);
   const auto elements = client_->elements({"main.FLAG", "Main.real", "Main.lreal", "Main.pause", "Main.text",
-                                           "Grid[1,2]", "Grid[0][0]", "Main.serial"});
+                                           "Grid[1,2]", "Grid[0][0]", "Main.serial", "Main.status",
+                                           "Line.pressure[1]", "Line.pressure[3]", "Line.label"});
   // An answer that finds no moment between the cycles says so.
   ValueReply reply;
   ASSERT_TRUE(eventually([&] {
@@ -60,8 +61,8 @@ TEST_F(Variables, OfEachTypeAreRead) {
     return reply.consistent;
   }));
   EXPECT_EQ(reply.code, ErrorCode::ok);
-  EXPECT_THAT(client_->texts(reply),
-              ElementsAre("TRUE", "1.5", "-2.0", "T#1s500ms", "'hello'", "6", "1", "4711"));
+  EXPECT_THAT(client_->texts(reply), ElementsAre("TRUE", "1.5", "-2.0", "T#1s500ms", "'hello'", "6", "1",
+                                                 "4711", "16#00FF", "7", "9", "'press'"));
   EXPECT_GT(reply.time_monotonic_ns, 0);
   EXPECT_GT(reply.time_unix_ns, 0);
   const auto& table = client_->table();

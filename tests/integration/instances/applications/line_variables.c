@@ -53,17 +53,9 @@ static void declare_all(void) {
   variable.dwFlags = PLC_VARIABLE_READ_ONLY;
   variable.pAddress = &line.stopped;
   plc_declare_variable(&variable);
-  variable.pszName = "line.label";
-  variable.dwType = PLC_TYPE_STRING;
-  variable.dwFlags = 0;
-  variable.pAddress = line.label;
-  variable.dwBytes = sizeof line.label;
-  plc_declare_variable(&variable);
+  PLC_DECLARE_STRING("line.label", line.label);
 #ifdef LONG_TEXT
-  variable.pszName = "note";
-  variable.pAddress = note;
-  variable.dwBytes = sizeof note;
-  plc_declare_variable(&variable);
+  PLC_DECLARE_STRING("note", note);
 #endif
   memset(&variable, 0, sizeof variable);
   variable.dwSize = sizeof variable;

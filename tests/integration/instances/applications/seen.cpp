@@ -45,6 +45,9 @@ std::int16_t changed = 1;
 std::int32_t changed = 2;
 #endif
 std::int16_t version = VERSION;
+std::uint16_t status = 0x00ff;
+short pressure[3] = {7, 8, 9};
+char label[8] = "press";
 
 // The compiler keeps neither out of the other's place.
 void move(std::uint64_t& to, std::uint64_t value) {
@@ -107,6 +110,11 @@ void setup(plc::Application& app) {
   app.variable("Main.serial", serial);
   app.variable("Main.changed", changed);
   app.variable("Main.version", version);
+  plc::VariableOptions word;
+  word.type = PLC_TYPE_WORD;
+  app.variable("Main.status", status, word);
+  PLC_DECLARE_ARRAY("Line.pressure[]", PLC_TYPE_INT, pressure, 1);
+  PLC_DECLARE_STRING("Line.label", label);
 }
 
 }  // namespace
