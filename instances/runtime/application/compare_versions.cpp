@@ -1,6 +1,8 @@
 #include "instances/runtime/application/compare_versions.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -63,12 +65,73 @@ std::string uses_of(const DeclaredArea& area) {
   return fmt::format("{}", fmt::join(uses, ", "));
 }
 
-void compare_area(const DeclaredArea& running, const DeclaredArea& next, std::vector<std::string>& lines) {
+using SeenSymbols =
+    std::map<std::string, const VariableSymbol*, decltype([](const auto& left, const auto& right) {
+               return compare_variable_names(left, right) < 0;
+             })>;
+
+template <class Of>
+SeenSymbols seen_symbols(std::span<const VariableSymbol> all, const Of& of) {
+  SeenSymbols symbols;
+  for (const VariableSymbol& symbol : all) {
+    if (of(symbol)) symbols.emplace(symbol.name, &symbol);
+  }
+  return symbols;
+}
+
+// In the words of the source: a variable is new, gone, or of another type. `of` says which are meant.
+template <class Of>
+std::vector<std::string> compare_seen(const SeenByBoth& seen, std::string_view kind, const Of& of) {
+  std::vector<std::string> lines;
+  const SeenSymbols running = seen_symbols(seen.running, of);
+  const SeenSymbols next = seen_symbols(seen.next, of);
+  for (const auto& [name, symbol] : running) {
+    const auto same = next.find(name);
+    if (same == next.end()) {
+      lines.push_back(fmt::format("{}variable '{}' is gone", kind, name));
+    } else {
+      Differences(lines, fmt::format("{}variable '{}'", kind, name))
+          .look("its type", type_text(*symbol), type_text(*same->second));
+    }
+  }
+  for (const auto& [name, symbol] : next) {
+    if (!running.contains(name)) lines.push_back(fmt::format("{}variable '{}' is new", kind, name));
+  }
+  return lines;
+}
+
+void compare_area(const DeclaredArea& running, const DeclaredArea& next, const SeenByBoth& seen,
+                  std::vector<std::string>& lines) {
   Differences area(lines, fmt::format("area '{}'", running.name));
   area.look("dwFlags", fmt::format("{:#x}", running.flags), fmt::format("{:#x}", next.flags));
-  area.look("dwBytes", running.bytes, next.bytes);
-  area.look("qwLayout", running.layout, next.layout);
+  if (running.bytes != next.bytes || running.layout != next.layout) {
+    const auto variables =
+        compare_seen(seen, fmt::format("area '{}': ", running.name),
+                     [&](const VariableSymbol& symbol) { return symbol.area == running.name; });
+    std::ranges::copy(variables, std::back_inserter(lines));
+    if (variables.empty()) {
+      area.look("dwBytes", running.bytes, next.bytes);
+      area.look("qwLayout", running.layout, next.layout);
+    }
+  }
   area.look("the tasks that use it", uses_of(running), uses_of(next));
+}
+
+// Those whose names begin with that one.
+std::span<const VariableSymbol> begin_with(std::span<const VariableSymbol> all, std::string_view name) {
+  const auto begin_of = [&](const VariableSymbol& symbol) {
+    return std::string_view(symbol.name).substr(0, name.size());
+  };
+  const auto less = [](std::string_view left, std::string_view right) {
+    return compare_variable_names(left, right) < 0;
+  };
+  return std::ranges::equal_range(all, name, less, begin_of);
+}
+
+// "Main.part" is that of "Main.part", "Main.part.hours" and "Main.part[].x".
+bool is_part_of(std::string_view name, std::string_view whole) {
+  if (name.size() > whole.size() && name[whole.size()] != '.' && name[whole.size()] != '[') return false;
+  return same_variable_name(name.substr(0, whole.size()), whole);
 }
 
 // Calls `compare` for what both have, and says what only one of them has.
@@ -99,26 +162,24 @@ std::vector<std::string> compare_tasks(std::span<const TaskConfig> running,
 }
 
 std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
-                                       std::span<const DeclaredArea> next) {
-  return compare_all("area", running, next, compare_area);
+                                       std::span<const DeclaredArea> next, const SeenByBoth& seen) {
+  return compare_all("area", running, next,
+                     [&](const DeclaredArea& one, const DeclaredArea& other,
+                         std::vector<std::string>& lines) { compare_area(one, other, seen, lines); });
 }
 
 std::vector<std::string> compare_variables(const CarriedByName& running, const CarriedByName& next,
-                                           const TypeOfVariable& running_type,
-                                           const TypeOfVariable& next_type) {
+                                           const SeenByBoth& seen) {
   std::vector<std::string> lines;
   for (const auto& [name, carried] : running) {
     const auto same = next.find(name);
     if (same == next.end()) continue;
     if (carried.bytes == same->second.bytes && carried.layout == same->second.layout) continue;
-    // Size and layout are those of the compiler: the type says more to the engineer.
-    const std::string was = running_type(name);
-    const std::string is = next_type(name);
-    if (!was.empty() && !is.empty() && was != is) {
-      lines.push_back(
-          fmt::format("variable '{}': its type is {}, of the one that runs it is {}", name, is, was));
-      continue;
-    }
+    const SeenByBoth whole{.running = begin_with(seen.running, name), .next = begin_with(seen.next, name)};
+    const auto members =
+        compare_seen(whole, "", [&](const VariableSymbol& symbol) { return is_part_of(symbol.name, name); });
+    std::ranges::copy(members, std::back_inserter(lines));
+    if (!members.empty()) continue;
     Differences variables(lines, fmt::format("variables '{}'", name));
     variables.look("dwBytes", carried.bytes, same->second.bytes);
     variables.look("qwLayout", carried.layout, same->second.layout);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,15 +16,21 @@ namespace plchost {
 /// The same tasks, in any order; all that the application or the settings say of them.
 [[nodiscard]] std::vector<std::string> compare_tasks(std::span<const TaskConfig> running,
                                                      std::span<const TaskConfig> next);
-/// The same areas, in any order, with the tasks that use them.
+/// The variables of both versions that are seen from outside. They say more to the engineer than sizes and
+/// layout numbers, which are those of a compiler. In the order of compare_variable_names().
+struct SeenByBoth {
+  std::span<const VariableSymbol> running;
+  std::span<const VariableSymbol> next;
+};
+/// The same areas, in any order, with the tasks that use them. Where size or layout differ, the variables in
+/// it do, if any is seen: those whose VariableSymbol::area is the name of the area.
 [[nodiscard]] std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
-                                                     std::span<const DeclaredArea> next);
-/// The type of a variable that is seen from outside, as people know it: "INT"; empty: it is not seen.
-using TypeOfVariable = std::function<std::string(std::string_view name)>;
-/// Variables that both name. Others may come and go.
-[[nodiscard]] std::vector<std::string> compare_variables(
-    const CarriedByName& running, const CarriedByName& next,
-    const TypeOfVariable& running_type = [](std::string_view) { return std::string(); },
-    const TypeOfVariable& next_type = [](std::string_view) { return std::string(); });
+                                                     std::span<const DeclaredArea> next,
+                                                     const SeenByBoth& seen = {});
+/// Variables that both name. Others may come and go. One that is not seen itself may have members that are:
+/// "Main.part" has "Main.part.hours" and "Main.part[].x".
+[[nodiscard]] std::vector<std::string> compare_variables(const CarriedByName& running,
+                                                         const CarriedByName& next,
+                                                         const SeenByBoth& seen = {});
 
 }  // namespace plchost

@@ -52,7 +52,8 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                std::chrono::duration<double>(kLongestSetup).count()));
   }
   PLCHOST_TRY(change->compare(next.declaration));
-  change->variables_ = context.host.variables().prepare(next.declaration.seen.take());
+  change->variables_ =
+      context.host.variables().prepare(next.declaration.seen.take());
   PLCHOST_TRY_ASSIGN(auto commit, Commit::prepare(context, change->next_, std::move(next.declaration)));
   change->commit_.emplace(std::move(commit));
   change->connect();
@@ -71,19 +72,14 @@ Result<void> OnlineChange::compare(const ApplicationDeclaration& declaration) co
   }
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(lines)); };
   add(compare_tasks(running_.tasks(), next_.tasks()));
-  add(compare_areas(host_.areas().declared(), declaration.areas));
-  const auto type_in = [](const auto& variables, const auto& symbol_of) {
-    return [&variables, symbol_of](std::string_view name) {
-      const auto found = std::ranges::find_if(
-          variables, [&](const VariableSymbol& symbol) { return same_variable_name(symbol.name, name); },
-          symbol_of);
-      return found == std::ranges::end(variables) ? std::string() : type_text(std::invoke(symbol_of, *found));
-    };
-  };
-  const auto running = host_.variables().access().symbols();
-  const auto next = declaration.seen.variables();
-  add(compare_variables(host_.declaration().variables, declaration.variables,
-                        type_in(running, std::identity()), type_in(next, &DeclaredVariable::symbol)));
+  std::vector<VariableSymbol> next;
+  std::ranges::transform(declaration.seen.variables(), std::back_inserter(next), &DeclaredVariable::symbol);
+  std::ranges::sort(next, [](const VariableSymbol& left, const VariableSymbol& right) {
+    return compare_variable_names(left.name, right.name) < 0;
+  });
+  const SeenByBoth seen{.running = host_.variables().access().symbols(), .next = next};
+  add(compare_areas(host_.areas().declared(), declaration.areas, seen));
+  add(compare_variables(host_.declaration().variables, declaration.variables, seen));
   if (lines.empty()) return {};
   return failure(ErrorCode::refused,
                  fmt::format("{} cannot take over online: {}; nothing is changed; load it without --online",

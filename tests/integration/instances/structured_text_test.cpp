@@ -296,7 +296,19 @@ TEST_P(TranslatedText, ThatIsChangedOnlineGoesOnWithItsValues) {
   const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
   EXPECT_EQ(refused.code, ErrorCode::refused);
   EXPECT_THAT(refused.text,
-              HasSubstr("variable 'ONE.FRESH': its type is REAL, of the one that runs it is DINT"));
+              HasSubstr("variable 'one.fresh': its type is REAL, of the one that runs it is DINT"));
+}
+
+TEST_P(TranslatedText, ThatRetainsOtherVariablesIsRefusedOnlineByTheirNames) {
+  ASSERT_TRUE(build(kCounting, "counting").success());
+  std::string text = kCounting;
+  text.replace(text.find("VAR RETAIN"), 10, "VAR RETAIN more : DINT;");
+  ASSERT_TRUE(build(text, "more").success());
+  start(so("counting"));
+  const ControlReply refused = sut->ask(ControlVerb::change_application, so("more"));
+  EXPECT_EQ(refused.code, ErrorCode::refused);
+  EXPECT_THAT(refused.text, HasSubstr("area 'retain': variable 'one.more' is new"));
+  EXPECT_THAT(refused.text, ::testing::Not(HasSubstr("qwLayout")));
 }
 
 TEST_F(TranslatedByMatiec, ThatIsNamedAsAHeaderOfCIsBuilt) {

@@ -139,12 +139,56 @@ TEST(VariablesOfTwoVersions, MayComeAndGoButNotChangeTheirLayout) {
 TEST(VariablesOfTwoVersions, AreNamedWithTheirTypesWhereBothAreSeen) {
   const CarriedByName running{{"MAIN.SPEED", {.bytes = 2, .layout = 1}}, {"MAIN.PART", {.bytes = 8}}};
   const CarriedByName next{{"MAIN.SPEED", {.bytes = 4, .layout = 2}}, {"MAIN.PART", {.bytes = 9}}};
-  const auto type = [](std::string_view of_speed) {
-    return [of_speed](std::string_view name) { return std::string(name == "MAIN.SPEED" ? of_speed : ""); };
-  };
-  EXPECT_THAT(compare_variables(running, next, type("INT"), type("DINT")),
+  const std::vector<VariableSymbol> was{{.name = "Main.speed", .type = VariableType::int_, .bytes = 2}};
+  const std::vector<VariableSymbol> is{{.name = "Main.speed", .type = VariableType::dint, .bytes = 4}};
+  EXPECT_THAT(compare_variables(running, next, {.running = was, .next = is}),
               ElementsAre("variables 'MAIN.PART': dwBytes is 9, of the one that runs it is 8",
-                          "variable 'MAIN.SPEED': its type is DINT, of the one that runs it is INT"));
+                          "variable 'Main.speed': its type is DINT, of the one that runs it is INT"));
+}
+
+TEST(VariablesOfTwoVersions, AreNamedByTheirMembers) {
+  const CarriedByName running{{"MAIN.PART", {.bytes = 8, .layout = 1}}};
+  const CarriedByName next{{"MAIN.PART", {.bytes = 8, .layout = 2}}};
+  const VariableSymbol hours{.name = "Main.part.hours", .type = VariableType::dint, .bytes = 4};
+  const VariableSymbol parts{.name = "Main.parts", .type = VariableType::dint, .bytes = 4};
+  VariableSymbol gone = hours;
+  gone.name = "Main.part[].x";
+  gone.dimensions = {{.first = 1, .count = 4}};
+  VariableSymbol added = hours;
+  added.name = "Main.part.minutes";
+  EXPECT_THAT(
+      compare_variables(running, next,
+                        {.running = std::vector{hours, gone, parts}, .next = std::vector{hours, added}}),
+      ElementsAre("variable 'Main.part[].x' is gone", "variable 'Main.part.minutes' is new"));
+  EXPECT_THAT(compare_variables(running, next, {.running = std::vector{hours}, .next = std::vector{hours}}),
+              ElementsAre("variables 'MAIN.PART': qwLayout is 2, of the one that runs it is 1"));
+}
+
+TEST(AreasOfTwoVersions, AreNamedByTheVariablesInThem) {
+  DeclaredArea running = area_named("retain");
+  DeclaredArea next = running;
+  next.layout = 2;
+  const VariableSymbol total{.name = "Main.total",
+                             .type = VariableType::dint,
+                             .bytes = 4,
+                             .dimensions = {},
+                             .task = "A",
+                             .area = "retain"};
+  VariableSymbol larger = total;
+  larger.type = VariableType::lint;
+  VariableSymbol added = total;
+  added.name = "Main.added";
+  VariableSymbol other = total;
+  other.name = "Main.other";
+  other.area = "%QX0.0";
+  EXPECT_THAT(
+      compare_areas(std::vector{running}, std::vector{next},
+                    {.running = std::vector{total}, .next = std::vector{added, other, larger}}),
+      ElementsAre("area 'retain': variable 'Main.total': its type is LINT, of the one that runs it is DINT",
+                  "area 'retain': variable 'Main.added' is new"));
+  EXPECT_THAT(compare_areas(std::vector{running}, std::vector{next},
+                            {.running = std::vector{total}, .next = std::vector{total}}),
+              ElementsAre("area 'retain': qwLayout is 2, of the one that runs it is 1"));
 }
 
 }  // namespace
