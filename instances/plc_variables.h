@@ -17,6 +17,10 @@
  * are compared without regard to case, as in IEC 61131-3. Each dimension of an array is a "[]" in the name:
  * "Line.temperature[]" is an array, "Grid[][]" one of two dimensions, "Pump[].speed" a member of each
  * structure of an array. Its elements are "Line.temperature[3]", "Grid[1,2]", "Pump[2].speed".
+ *
+ * Programs. A read-only string whose area is "program" tells that a program has its name and that its text is
+ * the type of the program. Its task runs the program, whose variables begin with the name and a dot. An
+ * export of the plant has these programs.
  */
 #ifndef PLC_VARIABLES_H
 #define PLC_VARIABLES_H
@@ -82,7 +86,7 @@ typedef struct {
   unsigned int nDimensions; /* as many as the name has "[]" */
   Plc_Dimension aDimensions[PLC_MAX_DIMENSIONS];
   const char* pszTask; /* the only task whose cycles use it; null: any */
-  const char* pszArea; /* for people: where it is mapped to, as "%QX0.1", or "retain"; null: nowhere */
+  const char* pszArea; /* where it is mapped to, as "%QX0.1"; "retain"; "program": see above; null: nowhere */
 } Plc_Variable;
 
 /* Declares a variable. From plc_app_init only. ERR_OK; ERR_PARAMETER: null, dwSize, a name, type, size or

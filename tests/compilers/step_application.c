@@ -92,6 +92,7 @@ void plc_log(int level, const char* text) {
 RTS_RESULT plc_declare_variable(const Plc_Variable* variable) {
   struct symbol* next;
   if (variable == NULL || strlen(variable->pszName) > PLC_MAX_SYMBOL_NAME) return ERR_PARAMETER;
+  if (variable->pszArea != NULL && strcmp(variable->pszArea, "program") == 0) return ERR_OK;
   if (symbol_count == PLC_MAX_DECLARED_VARIABLES) return ERR_NOMEMORY;
   next = &symbols[symbol_count++];
   next->declared = *variable;

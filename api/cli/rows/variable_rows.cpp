@@ -23,6 +23,10 @@ std::string_view forced_text(const plc_VariableRecord& variable) {
   return dds::text_of(variable.forced_value).empty() ? "elements forced" : "forced";
 }
 
+bool is_program(const plc_VariableRecord& variable) noexcept {
+  return dds::text_of(variable.area) == "program" && dds::text_of(variable.type).starts_with("STRING");
+}
+
 std::string recording_head(const VariableListing& sample) {
   std::string head = "time,time_unix_ns,consistent";
   for (const plc_VariableRecord& variable : sample.variables)

@@ -25,6 +25,10 @@ void mark_forced_arrays(std::vector<Row>& rows);
 /// For a person, beside the value: "forced", or of a whole array "elements forced". Empty: it is not.
 [[nodiscard]] std::string_view forced_text(const plc_VariableRecord& variable);
 
+/// A variable that stands for a program: it has the name of the program, and the text of its type. See
+/// instances/plc_variables.h.
+[[nodiscard]] bool is_program(const plc_VariableRecord& variable) noexcept;
+
 /// The first line of a recording as CSV, and the line of each sample, as RFC 4180 has it. The last column
 /// has the names of those that are forced, with blanks between, so that each other one has values alone.
 [[nodiscard]] std::string recording_head(const VariableListing& sample);

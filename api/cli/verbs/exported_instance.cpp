@@ -8,9 +8,11 @@
 
 #include <fmt/format.h>
 
+#include "api/cli/rows/variable_rows.hpp"
 #include "api/dds/text.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "shm/base/task_kind.hpp"
+#include "shm/base/trimmed.hpp"
 
 namespace plchost {
 
@@ -41,7 +43,10 @@ ExportedTask task_of(const plc_TaskStatus& task) {
 
 // "Pump[].speed[][]" as ARRAY [1..4, 0..2, 0..3] OF INT: "Pump[1..4].speed", ARRAY [0..2, 0..3] OF INT.
 ExportedVariable variable_of(const plc_VariableRecord& record) {
-  ExportedVariable variable{.path = "", .type = "", .address = std::string(dds::text_of(record.area))};
+  const std::string_view area = dds::text_of(record.area);
+  const bool retain = area == "retain";  // plc_variables.h
+  ExportedVariable variable{
+      .path = "", .type = "", .address = retain ? "" : std::string(area), .retain = retain};
   std::string_view type = dds::text_of(record.type);
   std::string_view bounds;  // "1..4, 0..2, 0..3"
   if (const std::size_t begin = type.find(" ["); type.starts_with("ARRAY")) {
@@ -75,6 +80,13 @@ struct VariableGroup {
   std::string task;  ///< of all of them; empty: several, or any
 };
 
+ExportedProgram program_of(const ExportedTask& task, std::string name, std::string type) {
+  // In ST a program without a task is a freewheeling one of its own name.
+  const bool is_the_task =
+      task.kind == ExportedKind::freewheeling && iec::folded(name) == iec::folded(task.name);
+  return {.name = std::move(name), .type = std::move(type), .task = is_the_task ? "" : task.name};
+}
+
 std::vector<VariableGroup> groups_of(std::span<const ListedVariable> variables) {
   std::vector<VariableGroup> groups;
   for (const plc_VariableRecord& variable : variables) {
@@ -97,19 +109,28 @@ std::vector<VariableGroup> groups_of(std::span<const ListedVariable> variables) 
 ExportedInstance exported_instance(std::string_view name, std::span<const plc_TaskStatus> tasks,
                                    std::span<const ListedVariable> variables) {
   ExportedInstance instance{.name = std::string(name), .tasks = {}, .programs = {}, .variables = {}};
-  for (const plc_VariableRecord& variable : variables) instance.variables.push_back(variable_of(variable));
-  const std::vector<VariableGroup> groups = groups_of(variables);
+  std::vector<ListedVariable> programs;
+  for (const ListedVariable& variable : variables) {
+    if (is_program(variable)) {
+      programs.push_back(variable);
+    } else {
+      instance.variables.push_back(variable_of(variable));
+    }
+  }
+  const std::vector<VariableGroup> groups =
+      programs.empty() ? groups_of(variables) : std::vector<VariableGroup>();
   for (const plc_TaskStatus& one : tasks) {
     if (dds::text_of(one.instance) != name) continue;
     const ExportedTask& task = instance.tasks.emplace_back(task_of(one));
     const std::size_t before = instance.programs.size();
+    for (const plc_VariableRecord& program : programs) {
+      if (dds::text_of(program.task) != task.name) continue;
+      instance.programs.push_back(program_of(task, std::string(dds::text_of(program.name)),
+                                             std::string(trimmed(dds::text_of(program.value), "'"))));
+    }
     for (const VariableGroup& group : groups) {
-      if (group.task != task.name) continue;
-      // In ST a program without a task is a freewheeling one of its own name.
-      const bool is_the_task =
-          task.kind == ExportedKind::freewheeling && iec::folded(group.word) == iec::folded(task.name);
-      instance.programs.push_back(
-          {.name = group.word, .type = group.word + "_type", .task = is_the_task ? "" : task.name});
+      if (group.task == task.name)
+        instance.programs.push_back(program_of(task, group.word, group.word + "_type"));
     }
     if (instance.programs.size() > before) continue;
     const bool freewheels = task.kind == ExportedKind::freewheeling;

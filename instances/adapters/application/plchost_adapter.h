@@ -94,11 +94,20 @@ struct plchost_symbol {
   const char* area; /* null: it is not located */
 };
 
+/* A program that a task runs. */
+struct plchost_program {
+  const char* name;
+  const char* type;
+  const char* task;
+};
+
 /* From the file that plcctl writes. */
 extern const char plchost_application_name[];
 extern const char plchost_scheduler[]; /* that it is made for; empty: any */
 extern const unsigned int plchost_task_count;
 extern const struct plchost_task plchost_tasks[];
+extern const unsigned int plchost_program_count;
+extern const struct plchost_program plchost_programs[];
 extern const unsigned int plchost_place_count;
 extern const struct plchost_place plchost_places[];
 extern unsigned long long plchost_exchanged[]; /* for each place, not in the inputs */
@@ -127,7 +136,7 @@ void plchost_exchange_places(const struct plchost_task* task);
 /* The bit of a place in the memory area as it is now. Any thread. */
 unsigned char plchost_bit_now(unsigned int place);
 
-/* From symbols.c. Returns 0 if that fails. */
+/* From symbols.c: variables and programs. Returns 0 if that fails. */
 int plchost_declare_symbols(void);
 
 /* From variables.c. */

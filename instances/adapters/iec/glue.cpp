@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "instances/adapters/iec/tokens.hpp"
+#include "shm/variables/variable_symbol.hpp"
 
 namespace plchost::iec {
 
@@ -51,6 +52,7 @@ Glue GlueWriter::write() {
   refuse_shared_bits();
   for (std::size_t i = 0; i < plan_.tasks.size(); ++i) write_task(plan_.tasks[i], i);
   write_tasks();
+  write_programs();
   write_variables();
   write_symbols();
   write_binding();
@@ -268,6 +270,28 @@ void GlueWriter::write_tasks() {
         task.extension.options ? fmt::format("&plchost_options_{}", i) : "0");
   }
   print("}};\n");
+}
+
+void GlueWriter::write_programs() {
+  std::string rows;
+  std::size_t count = 0;
+  for (const PlannedTask& task : plan_.tasks) {
+    for (const Program* const program : task.programs) {
+      if (program->name.size() > kMaxVariableName || program->type.size() >= kMaxVariableBytes) {
+        plan_.remarks.push_back(
+            {program->place, fmt::format("an export of the plant does not have the program "
+                                         "{}: its name or that of its type is too long",
+                                         program->name)});
+        continue;
+      }
+      rows += fmt::format("  {{\"{}\", \"{}\", \"{}\"}},\n", program->name, program->type, task.name);
+      ++count;
+    }
+  }
+  print(
+      "const unsigned int plchost_program_count = {};\nconst struct plchost_program plchost_programs[] = "
+      "{{\n{}  {{0}}}};\n",
+      count, rows);
 }
 
 void GlueWriter::write_variables() {

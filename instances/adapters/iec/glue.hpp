@@ -113,6 +113,7 @@ class GlueWriter {
   [[nodiscard]] std::vector<std::size_t> retained_by(std::size_t task) const;
   void write_options(const TaskOptions& options, std::size_t number);
   void write_tasks();
+  void write_programs();
   void write_variables();
 
   struct CopyRange {

@@ -124,6 +124,8 @@ class Declared {
     } else if (!address.empty()) {
       words.push_back("it lies at " + address);
     }
+    if (member.variable != nullptr && member.variable->retain && !owner.empty())
+      words.emplace_back("it is retained");
     const xml_node type = variable.append_child("type");
     if (member.variable != nullptr) {
       add_type(type, member.variable->type);

@@ -66,8 +66,11 @@ else
 fi
 if [ "${compilers[0]:-}" = matiec ]; then
   echo "- programs and located variables of Structured Text"
-  file_has 'names(".//resource[@name=\"line3\"]//pouInstance")' "halting_program counting_program conveyor1"
-  file_has 'root.find(".//pou[@name=\"conveyor1_type\"]//variable[@name=\"motor\"]").get("address")' "%QX0.0"
+  file_has 'names(".//resource[@name=\"line3\"]//pouInstance")' "halt1 product1 conveyor1"
+  file_has 'names(".//resource[@name=\"line3\"]//pouInstance", "typeName")' "Halt Product Conveyor"
+  file_has '" ".join(task.get("name") for task in root.iter("task") if task.find("pouInstance[@name=\"product1\"]") is not None)' counting
+  file_has 'root.find(".//pou[@name=\"Conveyor\"]//variable[@name=\"motor\"]").get("address")' "%QX0.0"
+  file_has 'names(".//globalVars[@retain=\"true\"]/variable")' products
   file_has 'names(".//dataType[@name=\"pulse_type\"]//variable")' "ET IN PT Q"
 fi
 kill -TERM "${managers[0]}"

@@ -1,4 +1,7 @@
 // The reader of PLCopen XML understands the files that an export writes.
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -8,6 +11,8 @@
 #include "instances/adapters/iec/task_file.hpp"
 #include "instances/adapters/plcopen/structured_text.hpp"
 #include "instances/adapters/plcopen/write_project.hpp"
+#include "instances/adapters/run_program.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::plcopen {
 namespace {
@@ -128,7 +133,9 @@ TEST(PlcopenExport, HasArraysOfStructuresAndAddressesThatStAllows) {
                    {.path = "pump2.more", .type = "INT", .address = ""}};
   one.tasks = {{.name = "fast", .kind = Kind::cyclic, .priority = 1, .interval_ns = 1'000'000, .event = ""}};
   one.programs = {{.name = "main", .type = "Main", .task = "fast"}};
+  one.variables.push_back({.path = "valve.strokes", .type = "DINT", .address = "", .retain = true});
   const std::string xml = project_of(plant_of({one}));
+  EXPECT_THAT(xml, HasSubstr("it is retained"));
   EXPECT_THAT(xml, HasSubstr("it lies at DB1.4"));
   EXPECT_THAT(xml, HasSubstr("it lies at %IW4"));
   const iec::Project project = read_again(xml);
@@ -136,8 +143,8 @@ TEST(PlcopenExport, HasArraysOfStructuresAndAddressesThatStAllows) {
   for (const iec::Variable& variable : project.configurations.at(0).globals)
     globals.push_back(variable.name + " " + variable.location + ": " + variable.type);
   EXPECT_THAT(globals, ElementsAre("pump : ARRAY[1..4] OF pump_type", "pump2 : INT", "pump2_2 : pump2_2_type",
-                                   "lamp %QX0.1: BOOL", "odd : INT"));
-  ASSERT_EQ(project.types.size(), 2U);
+                                   "valve : valve_type", "lamp %QX0.1: BOOL", "odd : INT"));
+  ASSERT_EQ(project.types.size(), 3U);
   EXPECT_EQ(project.types[0].definition,
             "PUMP_TYPE : STRUCT HOURS : ARRAY [ 0 .. 2 ] OF INT ; SPEED : REAL ; END_STRUCT ; ");
 }
@@ -205,6 +212,30 @@ TEST(PlcopenExport, IsXmlWhateverTheNamesAre) {
   for (const auto& problem : structured_text_of({"plant.xml", xml}).problems)
     EXPECT_THAT(problem.text, Not(HasSubstr("no XML")));
   EXPECT_THAT(xml, Not(HasSubstr("\x01")));
+}
+
+// The schema is PLCopen's, and no part of this repository.
+TEST(PlcopenSchema, HoldsForWhatIsExported) {
+  const char* const schema = std::getenv("PLCHOST_TC6_XSD");  // NOLINT(concurrency-mt-unsafe)
+  if (schema == nullptr || *schema == '\0') GTEST_SKIP() << "needs the schema of PLCopen (PLCHOST_TC6_XSD)";
+  ExportedInstance other{.name = "<line 2>", .tasks = {}, .programs = {}, .variables = {}};
+  other.tasks = {{.name = "a b", .kind = Kind::freewheeling, .priority = 31, .interval_ns = 0, .event = ""},
+                 {.name = "a_b", .kind = Kind::event, .priority = 3, .interval_ns = 0, .event = ""},
+                 {.name = "<&>", .kind = Kind::external, .priority = 1, .interval_ns = 0, .event = "\x02<"}};
+  other.programs = {{.name = "a b", .type = "A", .task = ""}, {.name = "two", .type = "A", .task = "a_b"}};
+  other.variables = {{.path = "odd", .type = "INT", .address = "DB1.4"},
+                     {.path = "pump[1..4].hours", .type = "ARRAY [0..2] OF WSTRING(80)", .address = "%IW4"},
+                     {.path = "two.limit", .type = "UINT (1..5)", .address = "", .constant = true},
+                     {.path = "two.<x>", .type = "<", .address = "", .retain = true}};
+  const std::filesystem::path folder = own_path("schema");
+  std::filesystem::create_directory(folder);
+  for (const auto& plant : {plant_of({}), plant_of({line()}), plant_of({line(), other})}) {
+    std::ofstream(folder / "plant.xml") << project_of(plant);
+    const auto end = run_program({"xmllint", "--noout", "--schema", schema, "plant.xml"}, folder);
+    ASSERT_TRUE(end) << end.error().describe();
+    EXPECT_TRUE(end->success()) << end->output;
+  }
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -76,6 +76,37 @@ TEST(ExportedInstance, HasAProgramForEachFirstWordThatOneTaskUsesAlone) {
                           "done_program : done_program_type WITH done"));
 }
 
+TEST(ExportedInstance, HasTheProgramsThatTheApplicationDeclares) {
+  const std::vector<plc_TaskStatus> tasks{task("line1", "fast", kCyclicKind),
+                                          task("line1", "done", kExternalKind),
+                                          task("line1", "rest", kFreewheelingKind)};
+  const auto program = [](const char* name, const char* type, const char* of_task) {
+    plc_VariableRecord record = variable(name, "STRING[80]", of_task, "program");
+    dds::copy_text(record.value, type);
+    return record;
+  };
+  const std::vector<ListedVariable> variables{
+      program("one", "'Press'", "fast"), variable("one.a", "INT", "fast"),
+      program("Rest", "'Cleaning'", "rest"), variable("some.a", "INT", "fast"),
+      program("two", "'Press'", "fast")};
+  const auto sut = exported_instance("line1", tasks, variables);
+  EXPECT_EQ(sut.variables.size(), 2U);
+  EXPECT_THAT(programs_of(sut),
+              ElementsAre("one : Press WITH fast", "two : Press WITH fast",
+                          "done_program : done_program_type WITH done", "Rest : Cleaning WITH "));
+}
+
+TEST(ExportedInstance, HasTheVariablesThatAreRetained) {
+  const std::vector<ListedVariable> variables{variable("total", "INT", "", "retain"),
+                                              variable("x", "INT", "", "%QW1")};
+  const auto sut = exported_instance("line1", {}, variables);
+  ASSERT_EQ(sut.variables.size(), 2U);
+  EXPECT_TRUE(sut.variables[0].retain);
+  EXPECT_EQ(sut.variables[0].address, "");
+  EXPECT_FALSE(sut.variables[1].retain);
+  EXPECT_EQ(sut.variables[1].address, "%QW1");
+}
+
 TEST(ExportedInstance, HasVariablesWithTheBoundsOfTheirArrays) {
   const std::vector<ListedVariable> variables{
       variable("grid[][]", "ARRAY [1..2, -1..2] OF INT"), variable("label", "STRING[80]", "", "%QX0.1"),

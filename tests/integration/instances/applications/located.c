@@ -65,6 +65,8 @@ static void run_guarded(void) {
 
 static const struct plchost_options of_fast_task = {500000L, 1, 1, 0, 1, 0, 0};
 static const struct plchost_options of_guarded_task = {0, 0, 0, 20000, 2, 0, 1};
+const unsigned int plchost_program_count = 1;
+const struct plchost_program plchost_programs[] = {{"cell1", "Cell", "fast"}};
 const unsigned int plchost_task_count = 5;
 const struct plchost_task plchost_tasks[] = {
     {"fast", 1, 2000000L, 0, run_fast, 8, of_fast, 0, 0, 0, &of_fast_task},
