@@ -13,6 +13,7 @@
 
 #include "api/cli/debug/debug_link.hpp"
 #include "api/cli/debug/debug_state.hpp"
+#include "api/cli/debug/expanded_array.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -36,11 +37,18 @@ class DapSession {
  private:
   using Json = nlohmann::json;
   using Answer = Result<Json>;  ///< the body
-  /// A frame's number: the thread's, and the place in its stack. That of its local variables is larger.
+  /// A frame's number: the thread's, and the place in its stack. Those of its global and local variables are
+  /// larger, and those of arrays larger than all of them.
   static constexpr std::int64_t kFramesOfThread = 1000;
-  static constexpr std::int64_t kLocals = 500;
+  static constexpr std::int64_t kFrames = 250;
+  static constexpr std::int64_t kGlobals = kFrames;
+  static constexpr std::int64_t kLocals = 2 * kFrames;
+  static constexpr std::int64_t kArrays = 1'000'000'000;  // the protocol's limit is 2^31
+  [[nodiscard]] static bool is_of_globals(std::int64_t reference) noexcept {
+    return reference % kFramesOfThread / kFrames * kFrames == kGlobals;
+  }
   [[nodiscard]] static bool is_of_locals(std::int64_t reference) noexcept {
-    return reference % kFramesOfThread >= kLocals;
+    return reference % kFramesOfThread / kFrames * kFrames == kLocals;
   }
 
   [[nodiscard]] Answer carry_out(const std::string& command, const Json& arguments);
@@ -60,6 +68,11 @@ class DapSession {
   /// Those that halt, but for this task. wrong_state: it does not halt itself; no task is let go.
   [[nodiscard]] Result<void> let_others_go(const std::string& task);
   [[nodiscard]] Answer pause(const Json& arguments);
+  [[nodiscard]] Answer elements_of(std::int64_t reference, const Json& arguments);
+  /// Null: it is of no array.
+  [[nodiscard]] const ExpandedArray* array_at(std::int64_t reference) const noexcept;
+  /// Without `prefix` in its name. An array gets a number to be expanded by.
+  [[nodiscard]] Json variable_json(const plc_VariableRecord& variable, std::string_view prefix);
   /// The value that a name means in a frame.
   [[nodiscard]] Answer evaluated(const Json& frame, const std::string& name, const std::string& context);
   /// Writes what the name means in a frame.
@@ -88,6 +101,7 @@ class DapSession {
   Json state_;
   std::vector<std::string> tasks_;  // thread 1 is the first
   DebugNews news_;
+  std::vector<ExpandedArray> arrays_;                      // each that the client was shown
   std::set<std::string> halted_;                           // as the client was told
   std::set<std::string> sources_;                          // paths of the client
   std::map<std::string, std::string> paths_;               // of those, by the file of their breakpoints

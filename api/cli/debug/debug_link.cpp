@@ -1,11 +1,14 @@
 #include "api/cli/debug/debug_link.hpp"
 
+#include <algorithm>
 #include <iterator>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "api/cli/debug/debug_state.hpp"
 #include "api/cli/debug/foreign_json.hpp"
+#include "api/cli/rows/variable_rows.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/names.hpp"
@@ -126,15 +129,32 @@ Result<nlohmann::json> DebugLink::state() {
   return failure(ErrorCode::busy, "the state of the debugger changes all the time; ask again");
 }
 
-Result<std::vector<ListedVariable>> DebugLink::variables(const std::string& pattern) {
+Result<std::vector<ListedVariable>> DebugLink::listed(VariableQuery query) {
   std::vector<ListedVariable> all;
-  VariableQuery query{.patterns = {pattern}, .forced = false, .after = 0};
   for (bool goes_on = true; goes_on;) {
     PLCHOST_TRY_ASSIGN(auto page, requests_.list_variables(query));
     PLCHOST_TRY_ASSIGN(goes_on, next_page(host_, page, query));
     std::ranges::move(page.variables, std::back_inserter(all));
   }
   return all;
+}
+
+Result<std::vector<ListedVariable>> DebugLink::globals() {
+  PLCHOST_TRY_ASSIGN(auto found, if_found(listed({})));
+  if (!found) return std::vector<ListedVariable>();
+  std::vector<ListedVariable> programs;
+  std::ranges::copy_if(*found, std::back_inserter(programs), is_program);
+  const auto is_no_global = [&](const plc_VariableRecord& variable) {
+    const std::string_view name = dds::text_of(variable.name);
+    const std::size_t dot = name.find('.');
+    if (is_program(variable)) return true;
+    if (dot == std::string_view::npos || programs.empty()) return dot != std::string_view::npos;
+    return std::ranges::any_of(programs, [&](const plc_VariableRecord& program) {
+      return same_variable_name(dds::text_of(program.name), name.substr(0, dot));
+    });
+  };
+  std::erase_if(*found, is_no_global);
+  return *std::move(found);
 }
 
 Result<ListedVariable> DebugLink::variable(const std::string& instance, const std::string& shown_name) {

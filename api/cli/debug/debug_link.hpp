@@ -50,7 +50,14 @@ class DebugLink {
   [[nodiscard]] Result<nlohmann::json> state();
 
   /// The variables that a pattern names, with their values.
-  [[nodiscard]] Result<std::vector<ListedVariable>> variables(const std::string& pattern);
+  [[nodiscard]] Result<std::vector<ListedVariable>> variables(const std::string& pattern) {
+    return listed({.patterns = {pattern}});
+  }
+  /// All that a query means, with their values.
+  [[nodiscard]] Result<std::vector<ListedVariable>> listed(VariableQuery query);
+  /// The variables that are of no program. Of an application that tells no programs: those without a dot in
+  /// their names.
+  [[nodiscard]] Result<std::vector<ListedVariable>> globals();
   /// The variable that a name means in a frame of `instance` (its path; empty: none): one of its own, else
   /// one by its whole name. not_found: there is none.
   [[nodiscard]] Result<ListedVariable> variable(const std::string& instance, const std::string& name);

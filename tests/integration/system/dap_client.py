@@ -194,18 +194,26 @@ def text(port, source):
     client.event("stopped")
     frames = stack(client, main)
     assert [one["name"].lower() for one in frames] == ["twice", "press"]
-    (scope,) = client.ask("scopes", frameId=frames[0]["id"])["scopes"]
+    scope, globals_ = client.ask("scopes", frameId=frames[0]["id"])["scopes"]
     locals_ = {one["name"].lower(): one["value"] for one in client.ask("variables", variablesReference=scope["variablesReference"])["variables"]}
     assert scope["name"] == "Locals" and locals_ == {"x": "1001", "twice": "0"}, (scope, locals_)
     changed = client.ask("setVariable", variablesReference=scope["variablesReference"], name="x", value="1002")
     assert changed["value"] == "1002", changed
     client.ask("setVariable", expect=False, variablesReference=scope["variablesReference"], name="x", value="40000")
     assert client.ask("evaluate", expression="x", frameId=frames[0]["id"])["result"] == "1002"
+    assert globals_["name"] == "Globals", globals_
+    shown = client.ask("variables", variablesReference=globals_["variablesReference"])["variables"]
+    assert [(one["name"].lower(), one["value"]) for one in shown] == [("limit", "20000")], shown
     client.ask("stepOut", threadId=main)
     client.event("stopped")
     client.ask("next", threadId=main)
     client.event("stopped")
     assert client.ask("evaluate", expression="press1.doubled")["result"] == "2004"
+    array = client.ask("evaluate", expression="press1.last")
+    shown = client.ask("variables", variablesReference=array["variablesReference"])["variables"]
+    assert [one["name"] for one in shown] == ["[1]", "[2]", "[3]"], shown
+    changed = client.ask("setVariable", variablesReference=array["variablesReference"], name="[3]", value="33")
+    assert changed["value"] == "33", changed
 
     assert client.ask("continue", threadId=main)["allThreadsContinued"] is False
     hit = client.event("stopped")

@@ -109,6 +109,39 @@ TEST_F(DapSessionTest, FindsAnArrayByTheNameThatItShows) {
   EXPECT_EQ(result("t[]", "watch"), "[3, 4]");
 }
 
+TEST_F(DapSessionTest, ExpandsAnArrayAndSetsItsElements) {
+  instance_.elements = {variable_record("Main.c.t[1]", "INT", "3"),
+                        variable_record("Main.c.t[2]", "INT", "4")};
+  const json array = ask("variables", {{"variablesReference", kInnermost}})["variables"][2];
+  EXPECT_EQ(array["indexedVariables"], 2);
+  const int reference = array["variablesReference"];
+  EXPECT_THAT(shown(reference), ElementsAre("[1]=3", "[2]=4"));
+  const json last =
+      ask("variables", {{"variablesReference", reference}, {"start", 1}, {"count", 9}})["variables"];
+  ASSERT_EQ(last.size(), 1U);
+  EXPECT_EQ(last[0]["name"], "[2]");
+  EXPECT_EQ(last[0]["evaluateName"], "Main.c.t[2]");
+  (void)ask("setVariable", {{"variablesReference", reference}, {"name", "[2]"}, {"value", "9"}});
+  EXPECT_THAT(instance_.written, ElementsAre("Main.c.t[2]=9"));
+  EXPECT_EQ(ask("evaluate", {{"expression", "t"}, {"frameId", kInnermost}})["variablesReference"], reference);
+  EXPECT_FALSE(answer("variables", {{"variablesReference", reference + 1}})["success"]);
+}
+
+TEST_F(DapSessionTest, AFrameHasTheGlobalsOfTheApplication) {
+  instance_.variables.push_back(variable_record("limit", "INT", "7"));
+  instance_.variables.push_back(variable_record("line.total", "DINT", "8"));
+  const json scope = ask("scopes", {{"frameId", kCaller}})["scopes"].back();
+  EXPECT_EQ(scope["name"], "Globals");
+  EXPECT_EQ(scope["expensive"], true);
+  const int reference = scope["variablesReference"];
+  EXPECT_THAT(shown(reference), ElementsAre("limit=7")) << "without programs: those without a dot";
+  instance_.variables.push_back(variable_record("MAIN", "STRING[5]", "'Press'"));
+  dds::copy_text(instance_.variables.back().area, "program");
+  EXPECT_THAT(shown(reference), ElementsAre("limit=7", "line.total=8"));
+  (void)ask("setVariable", {{"variablesReference", reference}, {"name", "line.total"}, {"value", "9"}});
+  EXPECT_THAT(instance_.written, ElementsAre("line.total=9"));
+}
+
 TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
   const json frames = ask("stackTrace", {{"threadId", 1}})["stackFrames"];
   ASSERT_EQ(frames.size(), 3U);

@@ -28,6 +28,7 @@ inline plc_VariableRecord variable_record(std::string_view name, std::string_vie
 struct DebuggedInstance {
   nlohmann::json tasks = nlohmann::json::array();  ///< of its state
   std::vector<plc_VariableRecord> variables;
+  std::vector<plc_VariableRecord> elements;      ///< of arrays among them, by their whole names
   std::vector<std::string> commands;             ///< that came, without the number of the session
   std::vector<std::string> written;              ///< NAME=VALUE
   bool busy = false;                             ///< it refuses commands
@@ -59,7 +60,7 @@ struct DebuggedInstance {
 
   [[nodiscard]] DebugRequests requests() {
     return {.call = [this](ControlVerb verb, const std::string& argument) { return answer(verb, argument); },
-            .list_variables = [this](const VariableQuery& query) { return list(query.patterns.front()); },
+            .list_variables = [this](const VariableQuery& query) { return list(query); },
             .read_state = [this](const DebugQuery& /*query*/) -> Result<DebugPart> {
               nlohmann::json told{{"session", 1}, {"tasks", tasks}};
               if (!breakpoints.is_null()) told["breakpoints"] = breakpoints;
@@ -80,11 +81,22 @@ struct DebuggedInstance {
     return nlohmann::json{{"id", 1}, {"line", 7}, {"file", file}, {"remark", remark}}.dump();
   }
 
+  Result<VariableListing> list(const VariableQuery& query) {
+    VariableListing page;
+    if (query.patterns.empty()) page.variables.assign(variables.begin(), variables.end());
+    for (const std::string& pattern : query.patterns) {
+      PLCHOST_TRY_ASSIGN(const auto found, like(pattern));
+      std::ranges::copy(found.variables, std::back_inserter(page.variables));
+    }
+    return page;
+  }
   // "PATH.*", or a whole name; that of an array is without its brackets.
-  Result<VariableListing> list(std::string_view pattern) {
+  Result<VariableListing> like(std::string_view pattern) {
     const bool all = pattern.ends_with('*');
     if (all) pattern.remove_suffix(1);
     VariableListing page;
+    std::ranges::copy_if(elements, std::back_inserter(page.variables),
+                         [&](const auto& element) { return dds::text_of(element.name) == pattern; });
     std::ranges::copy_if(variables, std::back_inserter(page.variables), [&](const auto& variable) {
       const std::string_view name = dds::text_of(variable.name);
       return all ? name.starts_with(pattern) : name.substr(0, name.find('[')) == pattern;

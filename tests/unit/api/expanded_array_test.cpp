@@ -1,0 +1,31 @@
+// The elements of arrays, as clients of a debugger ask for them.
+#include "api/cli/debug/expanded_array.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace plchost {
+namespace {
+
+TEST(ExpandedArray, NamesItsElements) {
+  const auto sut = ExpandedArray::of("Pump[].grid[][]", "ARRAY [1..2, -1..1, 0..3] OF INT");
+  ASSERT_TRUE(sut);
+  EXPECT_EQ(sut->elements(), 24U);
+  EXPECT_EQ(sut->element(0), "Pump[1].grid[-1,0]");
+  EXPECT_EQ(sut->element(5), "Pump[1].grid[0,1]");
+  EXPECT_EQ(sut->element(23), "Pump[2].grid[1,3]");
+  EXPECT_EQ(sut->label("Pump[2].grid[1,3]"), "[2].grid[1,3]");
+  EXPECT_EQ(sut->labelled("[2].grid[1,3]"), "Pump[2].grid[1,3]");
+}
+
+TEST(ExpandedArray, IsNoneOfAnotherType) {
+  for (const char* const type :
+       {"INT", "STRING[80]", "ARRAY of nothing", "ARRAY [1] OF INT", "ARRAY [2..1] OF INT",
+        "ARRAY [1..2, 3..4] OF INT", "ARRAY [1..99999999] OF INT", "ARRAY [] OF INT"})
+    EXPECT_FALSE(ExpandedArray::of("a[]", type)) << type;
+  EXPECT_FALSE(ExpandedArray::of("a", "ARRAY [1..2] OF INT"));
+  EXPECT_TRUE(ExpandedArray::of("a[]", "ARRAY [1..2] OF STRING[80]"));
+}
+
+}  // namespace
+}  // namespace plchost
