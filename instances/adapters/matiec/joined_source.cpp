@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 
 namespace plchost::matiec {
@@ -17,18 +18,6 @@ namespace plchost::matiec {
 namespace {
 
 using iec::Token;
-
-// Any other pragma is C for iec2c, or one of its own: {{ x = 1; }}, {disable code generation}.
-bool is_of_other_tools(const Token& token) {
-  if (token.kind != Token::Kind::pragma || token.text.starts_with("{{")) return false;
-  constexpr std::array<std::string_view, 9> kWords{"ATTRIBUTE", "REGION", "ENDREGION", "ANALYSIS", "FLAG",
-                                                   "INFO",      "TEXT",   "WARNING",   "ERROR"};
-  const std::string text = iec::folded(token.text);
-  const auto is_letter = [](char c) { return c >= 'A' && c <= 'Z'; };
-  const auto begin = std::ranges::find_if(text, is_letter);
-  const std::string_view word(begin, std::find_if_not(begin, text.end(), is_letter));
-  return std::ranges::find(kWords, word) != kWords.end();
-}
 
 void blank(std::string& text, std::size_t offset, std::size_t bytes) {
   for (char& c : std::span(text).subspan(offset, bytes)) {
@@ -215,13 +204,15 @@ TextForIec2c for_iec2c(const iec::Source& source) {
   BodyFinder bodies;
   SectionSplitter::Insertions insertions;
   for (const Token& token : tokens.all) {
+    if (iec::is_of_other_tools(token)) {  // any other pragma is C for iec2c, or one of its own
+      blank(text, token.offset, token.text.size());
+      continue;
+    }
     const bool is_interval = intervals.is_interval(token);
     sections.look(token);
     bodies.look(token);
     if (token.kind == Token::Kind::text) {
       name_signs(token, text, insertions);
-    } else if (is_of_other_tools(token)) {
-      blank(text, token.offset, token.text.size());
     } else if (token.kind == Token::Kind::place) {
       text.replace(token.offset, token.text.size(), iec::folded(token.text));
     } else if (is_interval && is_unknown_to_iec2c(token) && token.text.size() >= kAnyInterval.size()) {

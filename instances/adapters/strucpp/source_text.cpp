@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/place.hpp"
+#include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 
 namespace plchost::strucpp {
@@ -35,6 +36,10 @@ class Rewriter {
   Rewriter(const iec::Source& source, const std::set<std::string>& enumerations)
       : tokens_(iec::tokens_of(source.text, source.file).all), enumerations_(enumerations) {
     made_.text = source.text;
+    for (const Token& token : tokens_) {
+      if (iec::is_of_other_tools(token)) blank(made_.text, token.offset, end_of(token));
+    }
+    std::erase_if(tokens_, iec::is_of_other_tools);
   }
 
   SourceText run() {
@@ -140,7 +145,7 @@ class Rewriter {
     const Token* behind;  // the END_VAR of its globals
   };
 
-  const std::vector<Token> tokens_;
+  std::vector<Token> tokens_;
   const std::set<std::string>& enumerations_;
   std::size_t next_ = 0;
   bool in_program_ = false;

@@ -34,7 +34,7 @@ struct SourceText {
 [[nodiscard]] std::set<std::string> enumerations_in(std::span<const iec::Source> sources);
 
 /// Replaces the words that the compiler knows in another form only: Mode#busy, VAR_GLOBAL in a RESOURCE, and
-/// places that several programs have.
+/// places that several programs have. Pragmas of other tools become blanks.
 [[nodiscard]] SourceText text_for_strucpp(const iec::Source& source,
                                           const std::set<std::string>& enumerations);
 
