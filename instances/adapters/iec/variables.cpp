@@ -47,10 +47,10 @@ class VariableCollector {
   }
 
  private:
-  /// Where a variable stands.
+  /// Where a variable stands, or those in a block: then with dots at their ends.
   struct Within {
-    std::string path;   // with a dot at its end
-    std::string value;  // the same
+    std::string path;
+    std::string value;
     bool retain = false;
     std::size_t depth = 0;
   };
@@ -66,17 +66,10 @@ class VariableCollector {
 
   void add_global(const std::string& name, const Variable& variable) {
     if (variable.constant || !variable.location.empty() || !is_kept(variable)) return;
-    if (compiler_ == Compiler::matiec && !is_data(project_, variable.type)) return;  // a function block
     const std::size_t before = found_.all.size();
-    const Pou* const block = project_.pou(first_word(variable.type));
-    if (block != nullptr) {
-      add_all(*block, {name + ".", "strucpp::" + variable.member + ".", variable.retain, 0});
-    } else {
-      found_.all.push_back({name,
-                            compiler_ == Compiler::strucpp ? "strucpp::" + variable.member
-                                                           : fmt::format("*__GET_GLOBAL_{}()", name),
-                            layout_of(variable.type), variable.retain});
-    }
+    const std::string value = compiler_ == Compiler::strucpp ? "strucpp::" + variable.member
+                                                             : fmt::format("(*__GET_GLOBAL_{}())", name);
+    add(variable, {name, value, variable.retain, 0}, "");
     for (std::size_t task = 0; task < plan_.tasks.size(); ++task) {
       if (plan_.tasks[task].globals.contains(name)) add_retained(before, task);
     }
@@ -94,29 +87,33 @@ class VariableCollector {
       const bool is_own = variable.section == Section::input || variable.section == Section::output ||
                           variable.section == Section::local;
       if (is_own && !variable.constant && variable.location.empty() && is_kept(variable))
-        add(variable, within);
+        add_member(variable, within);
     }
     if (!pou.chart.empty()) add_steps(pou, within);
   }
 
-  void add(const Variable& variable, const Within& within) {
+  void add_member(const Variable& variable, const Within& within) {
+    const std::string member = variable.member.empty() ? folded(variable.name) : variable.member;
+    const bool has_flags = compiler_ == Compiler::matiec && is_data(project_, variable.type);
+    add(variable,
+        {within.path + folded(variable.name), within.value + member, within.retain || variable.retain,
+         within.depth},
+        has_flags ? ".value" : "");
+  }
+  // `end`: behind the name of one that is no block of the program, as there it is followed by flags.
+  void add(const Variable& variable, Within at, std::string_view end) {
     const std::string type = first_word(variable.type);
-    const std::string path = within.path + folded(variable.name);
-    const std::string value =
-        within.value + (variable.member.empty() ? folded(variable.name) : variable.member);
     const bool is_timer = std::ranges::find(kTimers, type) != kTimers.end();
-    const bool retain = within.retain || variable.retain;
-    if (is_timer && retain) {
+    if (is_timer && at.retain) {
       found_.remarks.push_back(
           {variable.place,
            fmt::format("{} is a {}: a timer begins anew at each start, RETAIN or not", variable.name, type)});
+      at.retain = false;
     }
-    const Pou* const block = project_.pou(type);
-    if (block != nullptr)
-      return add_all(*block, {path + ".", value + ".", retain && !is_timer, within.depth + 1});
-    const bool has_flags = compiler_ == Compiler::matiec && is_data(project_, type);
+    if (const Pou* const block = project_.pou(type))
+      return add_all(*block, {at.path + ".", at.value + ".", at.retain, at.depth + 1});
     found_.all.push_back(
-        {path, value + (has_flags ? ".value" : ""), layout_of(variable.type), retain && !is_timer});
+        {std::move(at.path), fmt::format("{}{}", at.value, end), layout_of(variable.type), at.retain});
   }
   // One that points into this version of the program means nothing in another one.
   bool is_kept(const Variable& variable) {

@@ -59,7 +59,8 @@ std::optional<unsigned> elementary(std::string_view type) {
   return found == kElementary.end() ? std::nullopt : std::optional(found->type);
 }
 
-/// The variables of the function blocks of IEC 61131-3, which no source declares: TYPE NAME, ...
+/// The variables of the function blocks in MATIEC's own library, which no source declares: TYPE NAME, ...
+/// COUNTED is the type behind the `_` of the block's name, else INT. Those within are left out.
 struct StandardBlock {
   std::string_view names;  // with blanks around each
   std::string_view members;
@@ -69,10 +70,20 @@ constexpr std::array kStandardBlocks{
     StandardBlock{" R_TRIG F_TRIG ", "BOOL CLK BOOL Q"},
     StandardBlock{" SR ", "BOOL S1 BOOL R BOOL Q1"},
     StandardBlock{" RS ", "BOOL S BOOL R1 BOOL Q1"},
-    StandardBlock{" CTU ", "BOOL CU BOOL R INT PV BOOL Q INT CV"},
-    StandardBlock{" CTD ", "BOOL CD BOOL LD INT PV BOOL Q INT CV"},
-    StandardBlock{" CTUD ", "BOOL CU BOOL CD BOOL R BOOL LD INT PV BOOL QU BOOL QD INT CV"},
-    StandardBlock{" RTC ", "BOOL IN DT PDT BOOL Q DT CDT"}};
+    StandardBlock{" CTU CTU_DINT CTU_LINT CTU_UDINT CTU_ULINT ",
+                  "BOOL CU BOOL R COUNTED PV BOOL Q COUNTED CV"},
+    StandardBlock{" CTD CTD_DINT CTD_LINT CTD_UDINT CTD_ULINT ",
+                  "BOOL CD BOOL LD COUNTED PV BOOL Q COUNTED CV"},
+    StandardBlock{" CTUD CTUD_DINT CTUD_LINT CTUD_UDINT CTUD_ULINT ",
+                  "BOOL CU BOOL CD BOOL R BOOL LD COUNTED PV BOOL QU BOOL QD COUNTED CV"},
+    StandardBlock{" RTC ", "BOOL IN DT PDT BOOL Q DT CDT"},
+    StandardBlock{" DERIVATIVE ", "BOOL RUN REAL XIN TIME CYCLE REAL XOUT"},
+    StandardBlock{" HYSTERESIS ", "REAL XIN1 REAL XIN2 REAL EPS BOOL Q"},
+    StandardBlock{" INTEGRAL ", "BOOL RUN BOOL R1 REAL XIN REAL X0 TIME CYCLE BOOL Q REAL XOUT"},
+    StandardBlock{
+        " PID ", "BOOL AUTO REAL PV REAL SP REAL X0 REAL KP REAL TR REAL TD TIME CYCLE REAL XOUT REAL ERROR"},
+    StandardBlock{" RAMP ", "BOOL RUN REAL X0 REAL X1 TIME TR TIME CYCLE BOOL BUSY REAL XOUT"},
+    StandardBlock{" SEMA ", "BOOL CLAIM BOOL RELEASE BOOL BUSY"}};
 
 /// The words of a type, read one after the other.
 class Words {
@@ -125,7 +136,8 @@ class ValueCollector {
   void add_type(const iec::Variable& variable, Symbol symbol, const std::string& type, std::size_t depth) {
     if (depth > kMostNested) return;
     Words words(type);
-    const std::string first = folded(words.take());
+    const std::string written = words.take();
+    const std::string first = folded(written);
     if (const auto known = elementary(first)) {
       symbol.type = *known;
       found_.all.push_back(std::move(symbol));
@@ -141,7 +153,7 @@ class ValueCollector {
       add_type(variable, std::move(symbol), declared->definition.substr(declared->definition.find(':') + 1),
                depth + 1);
     } else {
-      leave_out(variable, symbol, fmt::format("its type {} is not known", first));
+      leave_out(variable, symbol, fmt::format("its type {} is not known", written));
     }
   }
 
@@ -300,15 +312,17 @@ class Collector : ValueCollector {
       return known.names.find(fmt::format(" {} ", type)) != std::string_view::npos;
     });
     if (standard == kStandardBlocks.end()) return false;
-    add_standard(*standard, symbol);
+    const std::size_t suffix = type.starts_with("CT") ? type.find('_') : std::string::npos;
+    add_standard(*standard, suffix == std::string::npos ? "INT" : type.substr(suffix + 1), symbol);
     return true;
   }
 
-  void add_standard(const StandardBlock& block, const Symbol& within) {
+  void add_standard(const StandardBlock& block, std::string_view counted, const Symbol& within) {
     Words words(block.members);
     while (!words.ended()) {
       Symbol symbol = within;
-      symbol.type = *elementary(words.take());
+      const std::string type = words.take();
+      symbol.type = *elementary(type == "COUNTED" ? counted : type);
       const std::string member = words.take();
       symbol.name += "." + member;
       symbol.value += "." + member + ".value";

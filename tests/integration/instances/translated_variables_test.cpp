@@ -1,9 +1,12 @@
 // The variables of Structured Text that MATIEC or STruC++ has translated: seen, written and forced from
 // outside, while a real plc-instance runs it.
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,6 +17,9 @@
 namespace plchost::testing {
 namespace {
 
+using ::testing::HasSubstr;
+using ::testing::Not;
+
 /// By the compiler of that name.
 class VariablesOfTranslatedText : public ::testing::TestWithParam<std::string> {
  protected:
@@ -22,12 +28,18 @@ class VariablesOfTranslatedText : public ::testing::TestWithParam<std::string> {
     const char* const folder = std::getenv(variable);
     if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "needs " << variable;
   }
-  void start(const std::string& text) {
-    const std::string application = sandbox.folder() + "/shown.so";
+  /// The messages of the build.
+  std::string build(const std::string& text, const std::string& application) const {
     const auto built = run_program({PLCCTL, "build", "application", sandbox.write("shown.st", text), "-o",
                                     application, "--compiler", GetParam()},
                                    sandbox.folder());
-    ASSERT_TRUE(built && built->success()) << (built ? built->output : built.error().describe());
+    EXPECT_TRUE(built && built->success()) << (built ? built->output : built.error().describe());
+    return built ? built->output : "";
+  }
+  void start(const std::string& text) {
+    const std::string application = sandbox.folder() + "/shown.so";
+    (void)build(text, application);
+    ASSERT_FALSE(HasFailure());
     sut = std::make_unique<InstanceProcess>(sandbox, std::vector<std::string>{"--application", application});
     sut->wait_until_up();
   }
@@ -162,6 +174,71 @@ END_CONFIGURATION
       << "the body of the block that is extended does not run";
   EXPECT_EQ(sut->ask(ControlVerb::write_variable, "line.many[1].t[1]=3").code, ErrorCode::ok);
   EXPECT_EQ(client.read("line.many[1].t[1]"), "3");
+}
+
+/// STruC++ knows no global function blocks.
+class VariablesOfBlocks : public VariablesOfTranslatedText {};
+INSTANTIATE_TEST_SUITE_P(By, VariablesOfBlocks, ::testing::Values("matiec"),
+                         [](const auto& compiler) { return compiler.param; });
+
+constexpr const char* kBlocks = R"(
+FUNCTION_BLOCK Pump
+  VAR turns : DINT; END_VAR
+  turns := turns + 1;
+END_FUNCTION_BLOCK
+PROGRAM Main
+  VAR_EXTERNAL count : CTU; pump : Pump; END_VAR
+  VAR flank : BOOL; {attribute 'hide'} step1 : INT; END_VAR
+  flank := NOT flank;
+  count(CU := flank, PV := 30000);
+  pump();
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL RETAIN count : CTU; END_VAR
+  VAR_GLOBAL pump : Pump; END_VAR
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM one WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(VariablesOfBlocks, ThatAreGlobalAreRetainedAndGoOnInAnOnlineChange) {
+  std::string text = kBlocks;
+  EXPECT_THAT(build(text, sandbox.folder() + "/shown.so"), HasSubstr("{attribute 'hide'} has no effect"));
+  start(text);
+  ValueClient client(sandbox);
+  EXPECT_EQ(client.table().symbols()[client.table().find("count.CV")->symbol].area, "retain");
+  EXPECT_EQ(client.table().symbols()[client.table().find("pump.turns")->symbol].area, "");
+  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "count.CV=1000").code, ErrorCode::ok);
+  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "pump.turns=1000000").code, ErrorCode::ok);
+  text.replace(text.find("step1"), 5, "step1, step2");
+  (void)build(text, sandbox.folder() + "/next.so");
+  const ControlReply reply = sut->ask(ControlVerb::change_application, sandbox.folder() + "/next.so");
+  ASSERT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  EXPECT_TRUE(eventually([&] {
+    client.open_table();
+    return client.read("one.step2") == "0";
+  }));
+  EXPECT_GT(std::stoi(client.read("count.CV")), 999);
+  EXPECT_GT(std::stoi(client.read("pump.turns")), 999999);
+}
+
+TEST_P(VariablesOfBlocks, OfTheLibraryAreAllKnown) {
+  std::string variables;
+  std::size_t count = 0;
+  for (const auto& file : std::filesystem::directory_iterator(
+           std::filesystem::path(std::getenv("PLCHOST_MATIEC")) / "lib")) {  // NOLINT(concurrency-mt-unsafe)
+    std::ifstream lines(file.path());
+    for (std::string word; file.is_regular_file() && lines >> word;) {
+      if (word != "FUNCTION_BLOCK" || !(lines >> word)) continue;
+      variables += fmt::format("block{} : {}; ", ++count, word);
+    }
+  }
+  ASSERT_GT(count, 20U);
+  std::string text = kBlocks;
+  text.replace(text.find("flank :"), 0, variables);
+  EXPECT_THAT(build(text, sandbox.folder() + "/all.so"), Not(HasSubstr("cannot be seen")));
 }
 
 }  // namespace

@@ -78,6 +78,23 @@ TEST(MatiecSymbols, AreOfGlobalBlocks) {
   EXPECT_THAT(told.remarks, testing::IsEmpty());
 }
 
+TEST(MatiecSymbols, AreOfAllBlocksOfItsLibrary) {
+  const Symbols told = symbols(
+      "PROGRAM Main VAR c : CTU; d : CTD_ULINT; b : CTUD_Dint; p : PID; r : RAMP; s : SEMA; i : INTEGRAL; "
+      "v : DERIVATIVE; h : HYSTERESIS; END_VAR ; END_PROGRAM",
+      "", "PROGRAM one WITH fast : Main;");
+  EXPECT_THAT(told.remarks, testing::IsEmpty());
+  const auto found = by_name(told);
+  EXPECT_EQ(found.at("one.c.CV").type, PLC_TYPE_INT);
+  EXPECT_EQ(found.at("one.d.PV").type, PLC_TYPE_ULINT);
+  EXPECT_EQ(found.at("one.b.CV").type, PLC_TYPE_DINT);
+  EXPECT_EQ(found.at("one.b.QD").value, "PRESS__ONE.B.QD.value");
+  EXPECT_EQ(found.at("one.p.XOUT").type, PLC_TYPE_REAL);
+  EXPECT_EQ(found.at("one.r.TR").type, PLC_TYPE_TIMESPEC_TIME);
+  for (const char* const output : {"one.s.BUSY", "one.i.XOUT", "one.v.XOUT", "one.h.Q"})
+    EXPECT_TRUE(found.contains(output)) << output;
+}
+
 TEST(MatiecSymbols, TellTheElementsOfArraysAndTheMembersOfStructures) {
   const auto found = by_name(
       symbols("TYPE Point : STRUCT x, y : REAL; tags : ARRAY[1..3] OF INT; name : STRING; END_STRUCT;\n"
