@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "instances/adapters/iec/c_texts.hpp"
+#include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/strucpp/compiler.hpp"
 #include "instances/adapters/strucpp/glue.hpp"
 #include "instances/adapters/strucpp/line_directives.hpp"
@@ -52,9 +53,13 @@ class StrucppTranslator : public Translator {
     for (const iec::Source& source : context_.sources) files.push_back(source.file);
     auto plan = strucpp::read_plan(*text, files);
     if (!context_.has(plan)) return false;
-    if (!plan->problems.empty()) explain();
+    // A compiler that takes the word may do something else than it says.
+    const iec::Project project = iec::read_project(context_.sources).project;
+    context_.refuse_persistent(project, "STruC++");
+    if (!plan->problems.empty()) explain(project);
     std::ranges::move(plan->problems, std::back_inserter(context_.report.problems));
     std::ranges::move(plan->remarks, std::back_inserter(context_.report.remarks));
+    std::ranges::move(iec::idle_pragmas(context_.sources), std::back_inserter(context_.report.remarks));
     context_.project = std::move(plan->project);
     files_ = std::move(plan->files);
     symbols_ = std::move(plan->symbols);
@@ -202,9 +207,7 @@ class StrucppTranslator : public Translator {
   }
 
   // Of some things of the language it says only that another word was expected.
-  void explain() {
-    const iec::Project project = iec::read_project(context_.sources).project;
-    context_.refuse_persistent(project, "STruC++");
+  void explain(const iec::Project& project) {
     for (const iec::Configuration& configuration : project.configurations) {
       for (const iec::Resource& resource : configuration.resources) {
         if (configuration.resources.size() > 1) refuse_globals(resource);

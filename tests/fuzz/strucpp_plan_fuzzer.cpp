@@ -20,7 +20,7 @@ constexpr std::string_view kPlan =
     R"("name":"MAIN","place":[0,1,1],"variables":[{"name":"RAW","type":"INT","location":"%IW1",)"
     R"("section":"local","retain":true,"constant":false,"place":[0,4,7],"member":"RAW"}]}],"types":[{"name":"T",)"
     R"("definition":"T : ARRAY[1..2] OF INT","place":[0,2,1]}],"symbols":[{"name":"ONE.GRID[][].X",)"
-    R"("type":"INT","value":"g_config.ONE.GRID[][].X","bounds":[[0,1],[-2,3]]}],"configurations":[{"name":"cell","place":[0,8,1],)"
+    R"("type":"INT","value":"g_config.ONE.GRID[][].X","bounds":[[0,1],[-2,3]]}],"hidden":[{"name":"ONE.CAL","why":"x"}],"configurations":[{"name":"cell","place":[0,8,1],)"
     R"("globals":[{"name":"GO","type":"BOOL","location":"%IX0.0","section":"global","retain":false,)"
     R"("constant":false,"place":[0,9,1],"member":"GO.value"}],"resources":[{"name":"press","place":[0,8,1],)"
     R"("tasks":[{"name":"fast","interval":"T#2MS","single":"","priority":"1","place":[0,9,5]}],)"

@@ -122,7 +122,8 @@ class Reader {
 
   ReadPlan read(const json& root) {
     const Value plan(root, "");
-    plan.with({"format", "problems", "remarks", "files", "pous", "types", "symbols", "configurations"});
+    plan.with(
+        {"format", "problems", "remarks", "files", "pous", "types", "symbols", "hidden", "configurations"});
     (void)plan["format"].number(1, 1);
     plan["problems"].each([&](const Value& one) { read_.problems.push_back(problem(one)); });
     plan["remarks"].each([&](const Value& one) { read_.remarks.push_back(problem(one)); });
@@ -135,6 +136,15 @@ class Reader {
                                      .place = place(one["place"])});
     });
     plan["symbols"].each([&](const Value& one) { read_.symbols.push_back(symbol(one)); });
+    plan["hidden"].each([&](const Value& one) {
+      one.with({"name", "why"});
+      read_.symbols.push_back({.name = path(one["name"]),
+                               .type = "",
+                               .value = "",
+                               .bounds = {},
+                               .hidden = one["why"].text(kMostName)});
+      if (read_.symbols.back().hidden.empty()) one["why"].refuse("a reason");
+    });
     plan["configurations"].each(
         [&](const Value& one) { read_.project.configurations.push_back(configuration(one)); });
     return std::move(read_);
@@ -170,7 +180,8 @@ class Reader {
     PlannedSymbol symbol{.name = path(value["name"]),
                          .type = value["type"].name(),
                          .value = path(value["value"]),
-                         .bounds = {}};
+                         .bounds = {},
+                         .hidden = {}};
     value["bounds"].each([&](const Value& one) {
       std::vector<int> numbers;
       one.each([&](const Value& number) {

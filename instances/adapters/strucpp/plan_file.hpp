@@ -11,7 +11,7 @@
 
 namespace plchost::strucpp {
 
-/// A variable of the compiler's table for debuggers; an array is one of them.
+/// A variable of the compiler's table for debuggers, or one that it leaves out; an array is one of them.
 struct PlannedSymbol {
   struct Bounds {
     int first = 0;
@@ -21,6 +21,7 @@ struct PlannedSymbol {
   std::string type;            ///< "REAL"
   std::string value;           ///< in C++: "g_config.ONE.GRID[][].X", "TOTAL.value"
   std::vector<Bounds> bounds;  ///< for each []
+  std::string hidden = {};     ///< why it is not in the table, and has a name only; empty: it is
 };
 
 /// A program as translate.mjs has read it.

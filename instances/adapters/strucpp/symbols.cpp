@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -78,10 +80,11 @@ class Resolver {
     const std::vector<Step> names = steps_of(planned.name);
     const std::vector<Step> values = steps_of(planned.value);
     const std::string first = folded(names.front().word);
+    const bool is_hidden = !planned.hidden.empty();
     Symbol symbol;
     symbol.bounds = planned.bounds;
     place_ = {};
-    if (names.size() > 1 && values.front().word == "g_config") {
+    if (names.size() > 1 && (is_hidden ? is_program(first) : values.front().word == "g_config")) {
       if (!in_program(names, symbol)) return;
       symbol.root = "g_config";
     } else if (const auto global = plan_.globals.find(first); global != plan_.globals.end()) {
@@ -92,8 +95,20 @@ class Resolver {
     } else {
       return;  // of another resource
     }
+    if (is_hidden) return leave_out(symbol.name, planned.hidden);
     symbol.value = value_of(std::span(values).subspan(1));
     give_type(planned, std::move(symbol));
+  }
+  [[nodiscard]] bool is_program(const std::string& name) const {
+    return std::ranges::any_of(plan_.tasks, [&](const iec::PlannedTask& task) {
+      return std::ranges::any_of(task.programs,
+                                 [&](const iec::Program* program) { return folded(program->name) == name; });
+    });
+  }
+  // Once for each name.
+  void leave_out(const std::string& name, const std::string& why) {
+    if (!told_.insert(name).second) return;
+    found_.remarks.push_back({place_, fmt::format("{} cannot be seen from outside: {}", name, why)});
   }
 
   // Whether it can be seen.
@@ -139,7 +154,9 @@ class Resolver {
     place_ = variable.place;
     symbol.area = variable.location;
     symbol.read_only = symbol.read_only || variable.constant;
-    return !variable.type.starts_with("REFERENCE ");
+    if (!variable.type.starts_with("REFERENCE ")) return true;
+    leave_out(symbol.name, "it has references");
+    return false;
   }
   [[nodiscard]] const iec::Pou* block_of(const iec::Variable& variable) const {
     const std::size_t of = variable.type.rfind(" OF ");
@@ -159,15 +176,12 @@ class Resolver {
   }
 
   void give_type(const PlannedSymbol& planned, Symbol symbol) {
-    const auto leave_out = [&](const std::string& why) {
-      found_.remarks.push_back({place_, fmt::format("{} cannot be seen from outside: {}", symbol.name, why)});
-    };
     const auto* const type = std::ranges::find(kTypes, planned.type, &TableType::name);
-    if (type == kTypes.end()) return leave_out(fmt::format("its type is {}", planned.type));
+    if (type == kTypes.end()) return leave_out(symbol.name, fmt::format("its type is {}", planned.type));
     if (symbol.bounds.size() > PLC_MAX_DIMENSIONS)
-      return leave_out(fmt::format("it has more than {} dimensions", PLC_MAX_DIMENSIONS));
+      return leave_out(symbol.name, fmt::format("it has more than {} dimensions", PLC_MAX_DIMENSIONS));
     if (symbol.name.size() > PLC_MAX_SYMBOL_NAME)
-      return leave_out(fmt::format("its name has more than {} characters", PLC_MAX_SYMBOL_NAME));
+      return leave_out(symbol.name, fmt::format("its name has more than {} characters", PLC_MAX_SYMBOL_NAME));
     symbol.type = type->type;
     symbol.bytes = type->bytes;
     found_.all.push_back(std::move(symbol));
@@ -176,6 +190,7 @@ class Resolver {
   const iec::Project& project_;
   const iec::TaskPlan& plan_;
   iec::SourcePlace place_;  // of the innermost declaration that is known
+  std::set<std::string> told_;
   Symbols found_;
 };
 

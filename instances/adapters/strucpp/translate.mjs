@@ -8,7 +8,7 @@ import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const kMostMessages = 100; // more are not told
+const kMostMessages = 100; // more are counted only
 const kMostSymbols = 65536; // as plc_variables.h has it
 const kMostBases = 32; // that a block extends, one above the other
 const kMostElements = 1000; // of an array of function blocks, each with variables of its own
@@ -63,6 +63,20 @@ function placeOfGlobal(name) {
   return undefined;
 }
 
+// Where a variable is declared that refers to an object with an interface: the compiler's table for debuggers breaks off there.
+function placeOfInterface() {
+  const texts = sources.map((source) => withoutTexts(source.text));
+  const names = texts.flatMap((text) => Array.from(text.matchAll(/\bINTERFACE\s+(\w+)/gi), ([, name]) => name));
+  const declaration = new RegExp(`\\w+(?=\\s*:\\s*(?:${names.join('|')})\\b)`, 'i');
+  for (const [number, text] of names.length === 0 ? [] : texts.entries()) {
+    for (const section of text.matchAll(/\bVAR\w*\b[\s\S]*?\bEND_VAR\b/gi)) {
+      const at = section[0].search(declaration);
+      if (at >= 0) return placeAt(number, section.index + at);
+    }
+  }
+  return undefined;
+}
+
 // Some messages of the compiler have no line, and say in their text what they are about.
 function explained(found) {
   const character = /^unexpected character: ->([\s\S]+)<- at offset: (\d+), skipped \d+ characters\.$/.exec(found.message);
@@ -75,6 +89,8 @@ function explained(found) {
   }
   const comment = found.message === 'Unclosed block comment' ? placeOfComment(found.file) : undefined;
   if (comment !== undefined) return { place: comment, text: 'this comment has no end' };
+  const variable = found.message.endsWith("(reading 'definition')") ? placeOfInterface() : undefined;
+  if (variable !== undefined) return { place: variable, text: 'STruC++ knows no variables of an interface' };
   const global = /^Shared global '(\w+)' /.exec(found.message);
   const place = global === null ? undefined : placeOfGlobal(global[1]);
   return place === undefined ? undefined : { place, text: found.message };
@@ -562,13 +578,14 @@ class Plan {
   }
 }
 
-// The compiler's table for debuggers, which leaves out what a block inherits: it is made again from blocks that have all
-// their variables themselves. Nothing else may use the blocks behind that.
+// The compiler's table for debuggers, and why some variables are not in it. It is made again: the compiler's own one has
+// neither the globals outside of a CONFIGURATION nor what a block inherits. For the latter, blocks get all their variables
+// themselves: nothing else may use them behind that.
 async function debugTable({ ast, projectModel, symbolTables, debugTableCpp }) {
   const maker = join(folder, 'dist', 'backend', 'debug-table-gen.js');
-  const heirs = ast.functionBlocks.filter((block) => block.extends !== undefined);
-  if (heirs.length === 0 || projectModel === undefined || symbolTables === undefined || !existsSync(maker)) return debugTableCpp ?? '';
+  if (projectModel === undefined || symbolTables === undefined || !existsSync(maker)) return { table: debugTableCpp ?? '', skipped: [] };
   const { generateDebugTable } = await import(pathToFileURL(maker).href);
+  const heirs = ast.functionBlocks.filter((block) => block.extends !== undefined);
   const sectionsOf = (name, depth = 0) => {
     const block = symbolTables.lookupFunctionBlock(name.toUpperCase());
     if (block === undefined || depth > kMostBases) return [];
@@ -580,14 +597,41 @@ async function debugTable({ ast, projectModel, symbolTables, debugTableCpp }) {
   for (const [block, sections] of whole) {
     if (block !== undefined) block.declaration.varBlocks = sections;
   }
-  return generateDebugTable(ast, projectModel, symbolTables).debugTableCpp;
+  const outside = { varBlocks: ast.globalVarBlocks };
+  const made = generateDebugTable({ ...ast, configurations: [...ast.configurations, outside] }, projectModel, symbolTables);
+  return { table: withPlainGlobals(made.debugTableCpp, outside), skipped: made.skipped ?? [] };
+}
+
+// Those outside of a CONFIGURATION are no members of an object with a mutex.
+function withPlainGlobals(table, { varBlocks }) {
+  const names = varBlocks.flatMap((block) => block.declarations.flatMap((declaration) => declaration.names));
+  return names.reduce((text, name) => text.replaceAll(`(void*)&${name}.value`, `(void*)&${name}`), table);
+}
+
+// Each array as one: GRID[][].X.
+function pattern(path) {
+  return path.replace(/\[-?\d+\]/g, '[]');
+}
+
+// Of the variables that the table leaves out.
+function hiddenOf(skipped) {
+  const texts = [
+    [/^(?:unknown elementary type|unresolved type name): (\w+)$/, 'its type $1 is not known'],
+    [/^library type (\w+) is opaque to the debugger$/, 'its type $1 is one of a library'],
+    [/^array bounds not constant$/, 'its bounds are no numbers'],
+  ];
+  const found = new Map();
+  for (const { path, reason } of skipped) {
+    const [form, text] = texts.find(([one]) => one.test(reason)) ?? [/^/, 'STruC++ leaves it out: '];
+    found.set(pattern(path), { name: pattern(path), why: reason.replace(form, text) });
+  }
+  return [...found.values()].slice(0, kMostMessages);
 }
 
 // The variables of the compiler's table for debuggers, each array as one: GRID[][].X and the bounds of its indexes. An
 // entry of the table: { (void*)&g_config.ONE.GRID[-1][0].X, TAG_REAL, 0 },  // ONE.GRID[-1][0].X
 function symbolsOf(table) {
   const found = new Map();
-  const pattern = (text) => text.replace(/\[-?\d+\]/g, '[]');
   for (const [, value, type, path] of table.matchAll(/^ *\{ \(void\*\)&([\w.[\]-]+), TAG_(\w+), [^}]*\}, *\/\/ ([\w.[\]-]+)$/gm)) {
     const indexes = Array.from(path.matchAll(/\[(-?\d+)\]/g), ([, index]) => Number(index));
     const known = found.get(pattern(path));
@@ -620,15 +664,22 @@ function inCharacters({ place: [file, line, column], ...rest }) {
   return { ...rest, place: [file, line, column - before.length + [...before].length] };
 }
 
+function bounded(messages) {
+  const more = messages.length - kMostMessages;
+  if (more <= 0) return messages;
+  return [...messages.slice(0, kMostMessages), { place: [-1, 0, 0], text: `${more} more messages of this kind are not told` }];
+}
+
 const result = translate();
 const plan = {
   format: 1,
-  problems: result.success ? [] : result.errors.slice(0, kMostMessages).map(message),
+  problems: result.success ? [] : bounded(result.errors.map(message)),
   remarks: [],
   files: [],
   pous: [],
   types: [],
   symbols: [],
+  hidden: [],
   configurations: [],
 };
 if (!result.success && plan.problems.length === 0) plan.problems.push({ place: [-1, 0, 0], text: 'STruC++ has failed, and has not said why' });
@@ -642,15 +693,16 @@ if (result.success) {
     if (isTaken !== true) plan.problems.push({ place: [number, line, 0], text: `${name} AT ${location}: the declaration is not understood` });
   }
   found.checkLoops();
-  const table = await debugTable(result);
+  const { table, skipped } = await debugTable(result);
   plan.symbols = symbolsOf(table);
+  plan.hidden = hiddenOf(skipped);
   if (plan.symbols.length > kMostSymbols) {
     found.remarks.push({ place: [-1, 0, 0], text: `${plan.symbols.length} variables: those beyond ${kMostSymbols} cannot be seen from outside` });
     plan.symbols.length = kMostSymbols;
   }
   // Its task for a program without one is not used.
   const warnings = result.warnings.filter((warning) => !warning.message.includes('has no task assignment'));
-  plan.remarks = [...warnings.map(message), ...found.remarks].slice(0, kMostMessages);
+  plan.remarks = bounded([...warnings.map(message), ...found.remarks]);
   for (const file of result.cppFiles) {
     writeFileSync(file.name, file.content, { flag: 'wx' });
     plan.files.push(file.name);

@@ -60,6 +60,7 @@ struct Parts {
                          R"({"name":"two","type":"OTHER","task":"EDGE","place":[0,12,5]},)"
                          R"({"name":"rest","type":"IDLE","task":"","place":[0,13,5]})";
   std::string symbols = R"({"name":"ONE.TOTAL","type":"DINT","value":"g_config.ONE.TOTAL","bounds":[]})";
+  std::string hidden;
   std::string head = R"("problems":[],"remarks":[])";
 
   [[nodiscard]] std::string text() const {
@@ -72,7 +73,8 @@ struct Parts {
            pou("program", "OTHER", variable("GO", "BOOL", "section=external;member=")) + "," +
            pou("program", "IDLE", "") + "," + pou("function_block", "PUMP", variable("HOURS", "DINT")) + "," +
            pou("function_block", "TON", variable("START_TIME", "IEC_TIME")) + R"(],"types":[],"symbols":[)" +
-           symbols + R"(],"configurations":[{"name":"cell","place":[0,8,1],"globals":[)" + globals +
+           symbols + R"(],"hidden":[)" + hidden +
+           R"(],"configurations":[{"name":"cell","place":[0,8,1],"globals":[)" + globals +
            R"(],"resources":[{"name":"press","place":[0,8,1],"tasks":[)" + tasks + R"(],"programs":[)" +
            programs + "]}]}]}";
   }
@@ -171,12 +173,16 @@ TEST(StrucppGlue, RefusesOutputsOfTwoTasksThatShareBits) {
       Contains(HasSubstr("%QX0.1 and %QX0.1 share bits, and the tasks fast, edge use them")));
 }
 
-TEST(StrucppGlue, RefusesAnEdgeThatNobodyWouldSee) {
+// A variable of a program has a value of its own.
+TEST(StrucppGlue, ReadsTheInputOfAnEdgeInACyclicTask) {
   Parts parts;
   parts.main = variable("RAW", "BOOL", "at=%IX0.0");
-  EXPECT_THAT(texts(glue_of(parts).problems),
-              Contains(HasSubstr("SINGLE of edge: no other task reads GO at %IX0.0")))
-      << "a variable of a program has a value of its own";
+  const iec::Glue glue = glue_of(parts);
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(texts(glue.remarks), Contains("a.st:10:5: SINGLE of edge: the task fast reads GO at %IX0.0, as "
+                                            "no cyclic program has it in VAR_EXTERNAL"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_0[] = {\n  {0, &*g_config.ONE.RAW.raw_ptr(), 0, 0},\n"
+                                   "  {1, &*strucpp::GO.value.raw_ptr(), 0, 0},\n  {0}}"));
 }
 
 TEST(StrucppGlue, RefusesAnEdgeOfNoVariable) {
@@ -224,6 +230,36 @@ TEST(StrucppSymbols, OfArraysAreOneWithItsDimensions) {
                         "decltype((plchost_at(plchost_at(c.value, i0, i1).A, i2)))"));
   EXPECT_THAT(text, HasSubstr("{\"SPEED[][].A[]\", 16u, 8u, 0u, nullptr, nullptr, "
                               "{{-1, 3u}, {0, 4u}, {1, 2u}, }}"));
+}
+
+TEST(StrucppSymbols, SayWhichVariablesTheTableLeavesOut) {
+  Parts parts;
+  parts.symbols = symbol("ONE.LINK", "INT", "g_config.ONE.LINK");
+  parts.hidden = R"({"name":"ONE.TOTAL[].UTC","why":"its type CALENDAR is one of a library"},)"
+                 R"({"name":"SPEED","why":"its bounds are no numbers"},)"
+                 R"({"name":"OTHERS.SPEED","why":"it is one of another resource"})";
+  EXPECT_THAT(
+      texts(glue_of(parts).remarks),
+      testing::IsSupersetOf(
+          {"a.st:4:7: one.TOTAL[].UTC cannot be seen from outside: its type CALENDAR is one of a library",
+           "a.st:4:7: SPEED cannot be seen from outside: its bounds are no numbers",
+           "a.st:4:7: one.LINK cannot be seen from outside: it has references"}));
+  EXPECT_THAT(texts(glue_of(parts).remarks), Not(Contains(HasSubstr("another resource"))));
+  parts.hidden = R"({"name":"ONE.TOTAL","why":""})";
+  const auto plan = read_plan(parts.text(), std::vector<std::string>{"a.st"});
+  ASSERT_FALSE(plan);
+  EXPECT_THAT(plan.error().describe(), HasSubstr("hidden[0].why is ''; allowed is a reason"));
+}
+
+// A timer of a global begins anew, as each other one does.
+TEST(StrucppGlue, KeepsNoTimerThatIsGlobal) {
+  Parts parts;
+  parts.globals += "," + variable("PAUSE", "TON", "section=global;retain=true;member=PAUSE.value");
+  const iec::Glue glue = glue_of(parts);
+  EXPECT_THAT(glue.text, HasSubstr("v.path = \"PAUSE.START_TIME\""));
+  const std::string line = glue.text.substr(glue.text.find("v.path = \"PAUSE.START_TIME\""));
+  EXPECT_THAT(line.substr(0, line.find('\n')), HasSubstr("v.retain = 0;"));
+  EXPECT_THAT(texts(glue.remarks), Contains(HasSubstr("PAUSE is a TON: a timer begins anew")));
 }
 
 // Members within members have long names. The program is built all the same.
