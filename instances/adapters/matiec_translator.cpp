@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "instances/adapters/iec/c_texts.hpp"
+#include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/complements.hpp"
 #include "instances/adapters/matiec/explained.hpp"
@@ -40,6 +41,7 @@ class MatiecTranslator : public Translator {
     context_.project = std::move(project);
     std::ranges::move(problems, std::back_inserter(context_.report.problems));
     context_.refuse_persistent(context_.project, "MATIEC");
+    std::ranges::move(iec::idle_pragmas(context_.sources), std::back_inserter(context_.report.remarks));
     std::ranges::move(matiec::refused_words(context_.sources), std::back_inserter(context_.report.problems));
     std::ranges::move(matiec::refused_names(context_.project), std::back_inserter(context_.report.problems));
     if (context_.good()) {
@@ -134,9 +136,10 @@ class MatiecTranslator : public Translator {
     const auto end = context_.run("iec2c", command, context_.order.translate_limit);
     if (!end) return false;
     if (!end->success()) {
-      std::ranges::move(matiec::taken_variables(context_.project, compiler_.library),
+      std::ranges::move(matiec::taken_variables(context_.project, context_.sources, compiler_.library),
                         std::back_inserter(context_.report.problems));
     }
+    std::ranges::move(matiec::remarks_of(end->output, *joined_), std::back_inserter(context_.report.remarks));
     auto problems = matiec::problems_of(end->output, *joined_, context_.project, compiler_.library);
     if (!end->success())
       problems = matiec::explained(std::move(problems), context_.sources, context_.project);

@@ -186,7 +186,9 @@ class ProjectReader {
       if (take("AT")) {
         if (token().kind == Token::Kind::place) variable.location = folded(take().text);
         if (variable.name.empty())
-          report(variable.place, fmt::format("{}: write a name before AT", variable.location));
+          report(variable.place, variable.location.empty()
+                                     ? "'AT' is a word of the language; choose another name"
+                                     : fmt::format("{}: write a name before AT", variable.location));
       }
       variables.push_back(std::move(variable));
     } while (take(","));

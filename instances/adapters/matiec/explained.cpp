@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -67,33 +68,60 @@ void find_third_edition(const iec::Source& source, iec::SourceProblems& problems
   }
 }
 
+/// The names that iec2c does not take for those of variables.
+class WrongNames {
+ public:
+  explicit WrongNames(const iec::Project& project) {
+    for (const iec::Pou& pou : project.pous) declared_.insert(iec::folded(pou.name));
+    for (const iec::DeclaredType& type : project.types) declared_.insert(iec::folded(type.name));
+    for (const iec::Pou& pou : project.pous) add(pou.variables);
+    for (const iec::Configuration& configuration : project.configurations) {
+      add(configuration.globals);
+      for (const iec::Resource& resource : configuration.resources) add(resource.globals);
+    }
+  }
+
+  [[nodiscard]] iec::SourceProblem explained(iec::SourceProblem problem) const {
+    // If it comes first in its section, iec2c has its error at the key word before it.
+    const bool is_at_section = problem.text.starts_with("unexpected token after 'VAR");
+    const iec::Variable* variable = nullptr;
+    for (const iec::Variable* const one : variables_) {
+      if (one->place.file != problem.place.file || position(one->place) < position(problem.place)) continue;
+      if (variable == nullptr || position(one->place) < position(variable->place)) variable = one;
+    }
+    if (variable == nullptr || (variable->place != problem.place && !is_at_section)) return problem;
+    const std::string why = reason(iec::folded(variable->name));
+    if (why.empty()) return problem;
+    return {variable->place, fmt::format("'{}' is {}; choose another name", variable->name, why)};
+  }
+
+ private:
+  static std::pair<unsigned, unsigned> position(const iec::SourcePlace& place) {
+    return {place.line, place.column};
+  }
+  void add(const std::vector<iec::Variable>& variables) {
+    for (const iec::Variable& variable : variables) variables_.push_back(&variable);
+  }
+  [[nodiscard]] std::string reason(const std::string& name) const {
+    if (std::ranges::find(kReservedNames, name) != kReservedNames.end()) return "a word of the language";
+    return declared_.contains(name) ? "also the name of a type or POU" : "";
+  }
+
+  std::set<std::string> declared_;  // types and POUs, folded
+  std::vector<const iec::Variable*> variables_;
+};
+
 }  // namespace
 
 iec::SourceProblems explained(iec::SourceProblems problems, std::span<const iec::Source> sources,
                               const iec::Project& project) {
-  std::set<std::string> declared;
-  for (const iec::Pou& pou : project.pous) declared.insert(iec::folded(pou.name));
-  for (const iec::DeclaredType& type : project.types) declared.insert(iec::folded(type.name));
-  const auto explain = [&](const std::vector<iec::Variable>& variables) {
-    for (const iec::Variable& variable : variables) {
-      const std::string name = iec::folded(variable.name);
-      const bool is_word = std::ranges::find(kReservedNames, name) != kReservedNames.end();
-      if (!is_word && !declared.contains(name)) continue;
-      for (iec::SourceProblem& problem : problems) {
-        if (problem.place != variable.place) continue;
-        problem.text = fmt::format("'{}' is {}; choose another name", variable.name,
-                                   is_word ? "a word of the language" : "also the name of a type or POU");
-      }
-    }
-  };
-  for (const iec::Pou& pou : project.pous) explain(pou.variables);
-  for (const iec::Configuration& configuration : project.configurations) {
-    explain(configuration.globals);
-    for (const iec::Resource& resource : configuration.resources) explain(resource.globals);
-  }
+  const WrongNames names(project);
   iec::SourceProblems all;
   for (const iec::Source& source : sources) find_third_edition(source, all);
-  all.insert(all.end(), problems.begin(), problems.end());
+  for (iec::SourceProblem& problem : problems) {
+    problem = names.explained(std::move(problem));
+    if (std::ranges::find(all, problem) == all.end()) all.push_back(std::move(problem));
+  }
   return all;
 }
 

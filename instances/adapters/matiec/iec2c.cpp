@@ -49,12 +49,14 @@ constexpr std::size_t kMaxLine = 4096;  // the library's expressions need more s
 // Names are compared by the case of the library's texts, which is upper.
 struct Declared {
   std::string name;
+  std::string written;
   iec::SourcePlace place;
 };
 std::vector<Declared> declared_names(const iec::Project& project) {
   std::vector<Declared> names;
-  for (const iec::Pou& pou : project.pous) names.push_back({iec::folded(pou.name), pou.name_place});
-  for (const iec::DeclaredType& type : project.types) names.push_back({iec::folded(type.name), type.place});
+  for (const iec::Pou& pou : project.pous) names.push_back({iec::folded(pou.name), pou.name, pou.name_place});
+  for (const iec::DeclaredType& type : project.types)
+    names.push_back({iec::folded(type.name), type.name, type.place});
   return names;
 }
 
@@ -95,12 +97,54 @@ bool is_enumeration(const iec::DeclaredType& type) {
   return type.definition.starts_with(iec::folded(type.name) + " : (");
 }
 
+/// The values of an enumeration, where they are declared.
+std::vector<iec::Token> values_of(const iec::DeclaredType& type, std::span<const iec::Source> sources) {
+  std::vector<iec::Token> values;
+  const auto source = std::ranges::find(sources, type.place.file, &iec::Source::file);
+  if (source == sources.end()) return values;
+  const std::vector<iec::Token> tokens = iec::tokens_of(source->text, source->file).all;
+  auto token = std::ranges::find(tokens, type.place, &iec::Token::place);
+  token = std::find_if(token, tokens.end(), [](const iec::Token& one) { return one.is("("); });
+  for (; token != tokens.end() && !token->is(")"); ++token) {
+    const bool begins = token->is("(") || token->is(",");
+    if (begins && std::next(token)->kind == iec::Token::Kind::name) values.push_back(*std::next(token));
+  }
+  return values;
+}
+
 std::string taken_text(std::string_view name) {
   return fmt::format("'{}' is also a name in the library of iec2c; choose another one", name);
 }
 
 unsigned number_of(const std::ssub_match& match) {
   return static_cast<unsigned>(std::strtoul(match.str().c_str(), nullptr, 10));
+}
+
+struct Message {
+  [[nodiscard]] bool is_of_program() const { return fs::path(file).filename() == kJoinedFile; }
+
+  std::string file;
+  unsigned line;
+  unsigned column;
+  bool is_warning;
+  std::string text;
+};
+
+std::vector<Message> messages_in(std::string_view output) {
+  static const std::regex form(
+      R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning)(?: while generating C code)?: (.*)$)");
+  std::vector<Message> messages;
+  for (const auto part : std::views::split(output, '\n')) {
+    const std::string line(part.begin(), part.end());
+    std::smatch match;
+    if (line.size() > kMaxLine || !std::regex_match(line, match, form)) continue;
+    messages.push_back({match[1], number_of(match[2]), number_of(match[3]), match[4] == "warning", match[5]});
+  }
+  return messages;
+}
+
+void add_once(iec::SourceProblem problem, iec::SourceProblems& problems) {
+  if (std::ranges::find(problems, problem) == problems.end()) problems.push_back(std::move(problem));
 }
 
 }  // namespace
@@ -112,7 +156,11 @@ Result<Compiler> find_compiler(const std::string& folder) {
          {fs::path(chosen) / "iec2c", fs::path(chosen) / "bin" / "iec2c", fs::path(chosen)}) {
       if (auto found = compiler_of(program)) return *std::move(found);
     }
-    return failure(ErrorCode::not_found, fmt::format("there is no iec2c with its lib folder in {}", chosen));
+    return failure(
+        ErrorCode::not_found,
+        fmt::format("there is no built MATIEC (iec2c, lib/ieclib.txt, lib/C) in {}; build it there: "
+                    "autoreconf -i && ./configure && make",
+                    chosen));
   }
   for (const fs::path& program : iec::in_path("iec2c")) {
     if (auto found = compiler_of(program)) return *std::move(found);
@@ -132,7 +180,8 @@ iec::SourceProblems taken_names(const iec::Project& project, const std::string& 
   return problems;
 }
 
-iec::SourceProblems taken_variables(const iec::Project& project, const std::string& library) {
+iec::SourceProblems taken_variables(const iec::Project& project, std::span<const iec::Source> sources,
+                                    const std::string& library) {
   const std::set<std::string> taken = names_of_library(library);
   iec::SourceProblems problems;
   const auto check = [&](const std::string& name, const iec::SourcePlace& place) {
@@ -148,38 +197,37 @@ iec::SourceProblems taken_variables(const iec::Project& project, const std::stri
   }
   for (const iec::DeclaredType& type : project.types) {
     if (!is_enumeration(type)) continue;
-    const iec::Tokens words = iec::tokens_of(type.definition, type.place.file);
-    for (const iec::Token& value : words.all) {
-      if (value.kind == iec::Token::Kind::name) check(value.text, type.place);
-    }
+    for (const iec::Token& value : values_of(type, sources)) check(value.text, value.place);
   }
   return problems;
 }
 
 iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
                                 const iec::Project& project, const std::string& library) {
-  static const std::regex form(
-      R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning)(?: while generating C code)?: (.*)$)");
   iec::SourceProblems problems;
-  const auto add = [&](iec::SourceProblem problem) {
-    if (std::ranges::find(problems, problem) == problems.end()) problems.push_back(std::move(problem));
-  };
   const std::vector<Declared> names = declared_names(project);
-  for (const auto part : std::views::split(output, '\n')) {
-    const std::string line(part.begin(), part.end());
-    std::smatch match;
-    if (line.size() > kMaxLine || !std::regex_match(line, match, form) || match[4] != "error") continue;
-    if (fs::path(match[1].str()).filename() == kJoinedFile) {
-      add({source.place(number_of(match[2]), number_of(match[3])), match[5]});
+  for (const Message& message : messages_in(output)) {
+    if (message.is_warning) continue;
+    if (message.is_of_program()) {
+      add_once({source.place(message.line, message.column), message.text}, problems);
       continue;
     }
-    for (const std::string& word : words_in(fs::path(library) / match[1].str(), number_of(match[2]))) {
+    for (const std::string& word : words_in(fs::path(library) / message.file, message.line)) {
       const auto declared = std::ranges::find(names, word, &Declared::name);
       if (declared == names.end()) continue;
-      add({declared->place, taken_text(word)});
+      add_once({declared->place, taken_text(declared->written)}, problems);
     }
   }
   return problems;
+}
+
+iec::SourceProblems remarks_of(std::string_view output, const JoinedSource& source) {
+  iec::SourceProblems remarks;
+  for (const Message& message : messages_in(output)) {
+    if (message.is_warning && message.is_of_program())
+      add_once({source.place(message.line, message.column), "iec2c: " + message.text}, remarks);
+  }
+  return remarks;
 }
 
 }  // namespace plchost::matiec

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -30,12 +31,17 @@ inline constexpr std::string_view kJoinedFile = "joined.st";
 
 /// Variables and values of enumerations that are called as a POU of that library. iec2c refuses them in other
 /// words.
-[[nodiscard]] iec::SourceProblems taken_variables(const iec::Project& project, const std::string& library);
+[[nodiscard]] iec::SourceProblems taken_variables(const iec::Project& project,
+                                                  std::span<const iec::Source> sources,
+                                                  const std::string& library);
 
-/// The output of iec2c, in the words and places of the sources. Errors in its own library (in the folder
-/// `library`) come from a name of the program that the library has, too: that name is told, where it is
-/// declared.
+/// The errors in the output of iec2c, in the words and places of the sources. Errors in its own library (in
+/// the folder `library`) come from a name of the program that the library has, too: that name is told, where
+/// it is declared.
 [[nodiscard]] iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
                                               const iec::Project& project, const std::string& library);
+
+/// The warnings in that output. Those in its own library are left out.
+[[nodiscard]] iec::SourceProblems remarks_of(std::string_view output, const JoinedSource& source);
 
 }  // namespace plchost::matiec

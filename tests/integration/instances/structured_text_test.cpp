@@ -446,7 +446,7 @@ TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
                                        sandbox.folder())
                                .value();
   EXPECT_EQ(built.exit_code, 1);
-  EXPECT_THAT(built.output, HasSubstr("there is no iec2c with its lib folder in"));
+  EXPECT_THAT(built.output, HasSubstr("; build it there: autoreconf -i && ./configure && make"));
 }
 
 TEST_F(StructuredText, WhereNoCompilerIsFoundSaysHowToGetEach) {
@@ -472,7 +472,7 @@ TEST_F(StructuredText, IsTranslatedByTheCompilerThatIsNamed) {
   EXPECT_THAT(said({"--compiler", "strucpp", "--strucpp", sandbox.folder()}).output,
               HasSubstr("there is no built STruC++"));
   EXPECT_THAT(said({"--compiler", "matiec", "--matiec", sandbox.folder()}).output,
-              HasSubstr("there is no iec2c"));
+              HasSubstr("there is no built MATIEC"));
   const auto unknown = said({"--compiler", "other"});
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.output, HasSubstr("--compiler: other not in {matiec,strucpp}"));

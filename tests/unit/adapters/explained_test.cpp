@@ -15,9 +15,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 /// With an error of iec2c at that place.
-std::vector<std::string> explained_at(unsigned line, unsigned column, const std::string& text) {
+std::vector<std::string> explained_at(unsigned line, unsigned column, const std::string& text,
+                                      const std::string& error = "invalid") {
   const std::vector<iec::Source> sources{{"a.st", text}};
-  return texts(explained({{{"a.st", line, column}, "invalid"}}, sources, iec::read_project(sources).project));
+  return texts(explained({{{"a.st", line, column}, error}, {{"a.st", line, column}, error}}, sources,
+                         iec::read_project(sources).project));
 }
 
 TEST(RefusedByIec2c, AreVariablesThatAreCalledAsAWordOrAType) {
@@ -34,6 +36,19 @@ TEST(RefusedByIec2c, AreVariablesThatAreCalledAsAWordOrAType) {
   EXPECT_THAT(explained_at(8, 2, text), ElementsAre(HasSubstr("a.st:8:2: 'step' is a word")));
   EXPECT_THAT(explained_at(5, 19, text), ElementsAre("a.st:5:19: invalid"));
   EXPECT_THAT(explained_at(5, 3, text), ElementsAre("a.st:5:3: invalid"));
+}
+
+// iec2c has its error at the word before.
+TEST(RefusedByIec2c, AreSuchVariablesAlsoIfTheyComeFirst) {
+  const std::string text =
+      "TYPE Mode : (a, b); END_TYPE\nFUNCTION_BLOCK f\nVAR\n mode : Mode; y : INT; END_VAR "
+      "END_FUNCTION_BLOCK\n"
+      "FUNCTION_BLOCK g VAR y : INT; step : INT; END_VAR END_FUNCTION_BLOCK";
+  const std::string error = "unexpected token after 'VAR' in variable(s) declaration.";
+  EXPECT_THAT(explained_at(3, 1, text, error),
+              ElementsAre("a.st:4:2: 'mode' is also the name of a type or POU; choose another name"));
+  EXPECT_THAT(explained_at(3, 1, text), ElementsAre("a.st:3:1: invalid")) << "of another error";
+  EXPECT_THAT(explained_at(5, 18, text, error), ElementsAre("a.st:5:18: " + error)) << "y is no such name";
 }
 
 TEST(RefusedByIec2c, IsTheThirdEdition) {

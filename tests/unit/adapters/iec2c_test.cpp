@@ -40,11 +40,21 @@ TEST(Iec2cErrors, AreToldOnceAndWarningsAreNone) {
   EXPECT_THAT(told("anything\n" + std::string(100'000, 'x')), IsEmpty());
 }
 
+TEST(Iec2cWarnings, AreRemarksAtTheirPlaceInTheSources) {
+  const std::string output =
+      "joined.st:1-1..1-2: error: x\njoined.st:4-3..4-9: warning: Duplicate element found in CASE options.\n"
+      "joined.st:4-3..4-9: warning: Duplicate element found in CASE options.\n"
+      "/lib/ieclib.txt:4-3..4-9: warning: of the library";
+  EXPECT_THAT(texts(remarks_of(output, JoinedSource(kSources))),
+              ElementsAre("b.st:2:3: iec2c: Duplicate element found in CASE options."));
+}
+
 TEST(Iec2cErrors, InItsLibraryNameTheNameOfTheProgramThatItHasToo) {
   const std::string library = own_path("ieclib");
-  std::ofstream(library) << "FUNCTION MAX\nVAR_INPUT P : INT; END_VAR\n";
+  std::ofstream(library) << "FUNCTION MAX\nVAR_INPUT P : INT; MODE : INT; END_VAR\n";
   EXPECT_THAT(told(library + ":2-11..2-12: error: invalid\n" + library + ":2-11..2-12: error: again"),
-              ElementsAre("a.st:1:9: 'P' is also a name in the library of iec2c; choose another one"));
+              ElementsAre("a.st:1:9: 'P' is also a name in the library of iec2c; choose another one",
+                          "b.st:1:6: 'Mode' is also a name in the library of iec2c; choose another one"));
   std::remove(library.c_str());
 }
 
@@ -70,13 +80,13 @@ TEST(Iec2cNames, OfItsLibraryAreToldOfVariablesAndValuesToo) {
       << "FUNCTION LEFT\nFUNCTION LIMIT\nFUNCTION_BLOCK INTEGRAL";
   const std::vector<iec::Source> sources{
       {"a.st",
-       "TYPE Way : (Left, Ahead); Parts : STRUCT left : INT; END_STRUCT; END_TYPE\n"
+       "TYPE Way : (Ahead, Left := 5); Parts : STRUCT left : INT; END_STRUCT; END_TYPE\n"
        "FUNCTION_BLOCK Ctl\nVAR integral : REAL; END_VAR\nEND_FUNCTION_BLOCK\n"
        "CONFIGURATION c VAR_GLOBAL limit : INT; other : INT; END_VAR END_CONFIGURATION"}};
-  EXPECT_THAT(texts(taken_variables(iec::read_project(sources).project, library)),
+  EXPECT_THAT(texts(taken_variables(iec::read_project(sources).project, sources, library)),
               ElementsAre("a.st:3:5: 'integral' is also a name in the library of iec2c; choose another one",
                           "a.st:5:28: 'limit' is also a name in the library of iec2c; choose another one",
-                          "a.st:1:6: 'LEFT' is also a name in the library of iec2c; choose another one"));
+                          "a.st:1:20: 'Left' is also a name in the library of iec2c; choose another one"));
   std::filesystem::remove_all(library);
 }
 
@@ -147,7 +157,8 @@ TEST(TheJoinedSource, CountsColumnsWithoutTheSectionsThatItHasInserted) {
 TEST(BuildOfAnApplication, SaysHowToGetACompiler) {
   const auto none = find_compiler("/nowhere");
   ASSERT_FALSE(none);
-  EXPECT_THAT(none.error().describe(), HasSubstr("there is no iec2c with its lib folder in /nowhere"));
+  EXPECT_THAT(none.error().describe(),
+              HasSubstr("in /nowhere; build it there: autoreconf -i && ./configure && make"));
 }
 
 TEST(BuildOfAnApplication, SaysWhatIsWrongInTheSourcesBeforeItRunsACompiler) {
