@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -57,6 +58,9 @@ class Planner {
     }
     for (PlannedTask& task : plan_.tasks) find_uses(task);
     for (const PlannedTask& task : plan_.tasks) check(task);
+    for (const PlannedTask& task : plan_.tasks) {
+      if (!task.single.empty()) check_single(task);
+    }
     check_areas();
     if (compiler_ == Compiler::matiec) {
       check_period();
@@ -234,7 +238,6 @@ class Planner {
                       "milliseconds up to 49 days",
                       task.name));
     }
-    if (!task.single.empty()) check_single(task);
   }
   // iec2c needs a tick, though no task of plchost runs by it.
   void check_period() {
@@ -322,18 +325,44 @@ class Planner {
     const auto place = place_of(location);
     // The memory area is read where it lies.
     if (!place || place->area == 'M') return;
-    // With iec2c all variables of a place are one.
-    const bool is_read = std::ranges::any_of(plan_.tasks, [&](const PlannedTask& other) {
-      return other.single.empty() && other.extension.external_event.empty() &&
-             (compiler_ == Compiler::matiec ? other.places.contains(*place)
-                                            : other.globals.contains(folded(task.single)));
+    // With iec2c all variables of a place are one, but an input of a program has a value for each task.
+    const bool is_one = compiler_ == Compiler::matiec && place->area != 'I';
+    const bool is_used = std::ranges::any_of(plan_.tasks, [&](const PlannedTask& other) {
+      return runs_by_itself(other) &&
+             (is_one ? other.places.contains(*place) : other.globals.contains(folded(task.single)));
     });
-    if (is_read) return;
-    plan_.problems.push_back(
+    if (is_used) return;
+    PlannedTask* const reader = place->area == 'I' ? quickest() : nullptr;
+    const std::string variable = fmt::format("{} at {}", task.single, location);
+    if (reader == nullptr) {
+      const std::string why =
+          place->area == 'I'
+              ? fmt::format("no task reads {}; add a TASK with an INTERVAL and a program", variable)
+              : fmt::format("no cyclic program writes {}; name it in the VAR_EXTERNAL of one", variable);
+      plan_.problems.push_back(
+          {task.place, fmt::format("SINGLE of {} would see no edge: {}", task.name, why)});
+      return;
+    }
+    reader->places.insert(*place);
+    reader->globals.insert(folded(task.single));
+    plan_.remarks.push_back(
         {task.place,
-         fmt::format("SINGLE of {}: no other task reads {} at {}, so nobody would see its edge; name it in "
-                     "the VAR_EXTERNAL of a cyclic program",
-                     task.name, task.single, location)});
+         fmt::format("SINGLE of {}: the task {} reads {}, as no cyclic program has it in VAR_EXTERNAL",
+                     task.name, reader->name, variable)});
+  }
+  [[nodiscard]] static bool runs_by_itself(const PlannedTask& task) {
+    return task.single.empty() && task.extension.external_event.empty();
+  }
+  // The cyclic task with the shortest interval, else a freewheeling one. Null: there is none.
+  [[nodiscard]] PlannedTask* quickest() {
+    const auto rank = [](const PlannedTask& task) {
+      return std::tuple(task.interval_ns == 0, task.interval_ns, task.priority);
+    };
+    PlannedTask* best = nullptr;
+    for (PlannedTask& task : plan_.tasks) {
+      if (runs_by_itself(task) && (best == nullptr || rank(task) < rank(*best))) best = &task;
+    }
+    return best;
   }
 
   using Tasks = std::vector<const PlannedTask*>;

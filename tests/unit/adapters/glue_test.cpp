@@ -123,7 +123,7 @@ TEST_F(MatiecGlue, SeesNoEdgeInATaskThatOnlyAnEventRuns) {
                                                "PROGRAM one WITH edge : Main; PROGRAM two WITH fast : Main;",
                           {{"BOOL", "__IX0_0", "%IX0.0"}}, "task.fast.external_event='product'")
                         .problems),
-              ElementsAre(HasSubstr("so nobody would see its edge")));
+              ElementsAre(HasSubstr("SINGLE of edge would see no edge")));
 }
 
 TEST_F(MatiecGlue, SaysWhatWouldNeverRelease) {
@@ -131,12 +131,46 @@ TEST_F(MatiecGlue, SaysWhatWouldNeverRelease) {
       std::string(kIdle) + "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;";
   const std::string input = "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR";
   const std::vector<Located> located{{"BOOL", "__IX0_0", "%IX0.0"}};
-  EXPECT_THAT(texts(write(kMain, input, edge, located).problems),
-              ElementsAre(HasSubstr("no other task reads go at %IX0.0, so nobody would see its edge")));
+  EXPECT_THAT(
+      texts(write(kMain, input, edge, located).problems),
+      ElementsAre("c.st:4:47: SINGLE of edge would see no edge: no task reads go at %IX0.0; add a TASK "
+                  "with an INTERVAL and a program"));
+  EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL go AT %QX0.0 : BOOL; END_VAR",
+                          edge + kFast + "PROGRAM two WITH fast : Other;", {{"BOOL", "__QX0_0", "%QX0.0"}})
+                        .problems),
+              ElementsAre(HasSubstr("no cyclic program writes go at %QX0.0")));
   EXPECT_THAT(texts(write(kMain, input, edge + kFast + "PROGRAM two WITH fast : Main;", located).problems),
               IsEmpty());
   EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL go : INT; END_VAR", edge).problems),
               ElementsAre("c.st:4:47: SINGLE of edge: 'go' is no BOOL of a VAR_GLOBAL"));
+}
+
+// A push-button that only its own task uses.
+TEST_F(MatiecGlue, ReadsTheInputOfAnEdgeInTheQuickestTask) {
+  const Glue glue =
+      write(std::string(kMain) + " PROGRAM Other VAR a : INT; END_VAR END_PROGRAM",
+            "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR",
+            std::string("TASK slow (INTERVAL := T#1s, PRIORITY := 2);") + kFast +
+                "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM rest : Other;"
+                "PROGRAM two WITH slow : Other; PROGRAM one WITH edge : Main; PROGRAM three WITH "
+                "fast : Other;",
+            {{"BOOL", "__IX0_0", "%IX0.0"}});
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(
+      texts(glue.remarks),
+      Contains(HasSubstr(
+          "SINGLE of edge: the task fast reads go at %IX0.0, as no cyclic program has it in VAR_EXTERNAL")));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1[] = {\n  {0, &plchost_value_0, 0, 0},\n  {0}}"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_0[] = {\n  {0}}"));
+  // An input of a program has a value of its own in each task.
+  const Glue own = write(std::string(kMain) + " PROGRAM Other VAR a AT %IX0.0 : BOOL; END_VAR END_PROGRAM",
+                         "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR",
+                         std::string(kFast) +
+                             "TASK edge (SINGLE := go, PRIORITY := 0);"
+                             "PROGRAM one WITH edge : Main; PROGRAM two WITH fast : Other;",
+                         {{"BOOL", "__IX0_0", "%IX0.0"}});
+  EXPECT_THAT(own.text, HasSubstr("plchost_uses_0[] = {\n  {0, &plchost_input_0_0, 0, 0},\n"
+                                  "  {0, &plchost_value_0, 0, 0},\n  {0}}"));
 }
 
 TEST_F(MatiecGlue, WantsATaskWithAnInterval) {
@@ -281,11 +315,32 @@ TEST_F(MatiecGlue, NamesAllVariablesOfItsProgramsAndTheirBlocks) {
   EXPECT_THAT(glue.text, HasSubstr("&PRESS__M.PUMP.ON.value;"));
   EXPECT_THAT(glue.text, HasSubstr("&PRESS__M.PUMP.LATE;"));
   EXPECT_THAT(glue.text, HasSubstr("&PRESS__M.SPOT.value;"));
-  EXPECT_THAT(glue.text, HasSubstr("&*__GET_GLOBAL_GO();"));
+  EXPECT_THAT(glue.text, HasSubstr("&(*__GET_GLOBAL_GO());"));
   EXPECT_THAT(glue.text, HasSubstr("#undef M\n")) << "the resource's macro for the instance";
   for (const char* nothing : {"PUMP.T.", "PUMP.P", "MOST", "M.GO"})
     EXPECT_THAT(glue.text, Not(HasSubstr(nothing)));
   EXPECT_THAT(glue.text, HasSubstr("plchost_retained_0[] = {0, 1, 0};"));
+}
+
+// iec2c keeps the flags of each variable beside its value, but those of a block are in its variables.
+TEST_F(MatiecGlue, KeepsTheVariablesOfGlobalBlocks) {
+  const Glue glue = write(
+      "FUNCTION_BLOCK Pump VAR_INPUT on : BOOL; END_VAR VAR done : CTU; END_VAR END_FUNCTION_BLOCK "
+      "PROGRAM Main VAR_EXTERNAL count : CTU; left : Pump; late : TON; END_VAR END_PROGRAM",
+      "VAR_GLOBAL RETAIN count : CTU; late : TON; END_VAR VAR_GLOBAL left : Pump; END_VAR",
+      std::string(kFast) + "PROGRAM m WITH fast : Main;");
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  const auto kept = [&](const std::string& path, const std::string& value) {
+    return glue.text.find(fmt::format("v.path = \"{0}\"; v.value = &{1}; v.bytes = sizeof {1};", path,
+                                      value)) != std::string::npos;
+  };
+  EXPECT_TRUE(kept("COUNT", "(*__GET_GLOBAL_COUNT())"));
+  EXPECT_TRUE(kept("LEFT.ON", "(*__GET_GLOBAL_LEFT()).ON.value"));
+  EXPECT_TRUE(kept("LEFT.DONE", "(*__GET_GLOBAL_LEFT()).DONE"));
+  EXPECT_TRUE(kept("LATE", "(*__GET_GLOBAL_LATE())"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_retained_0[] = {0, 0};")) << "the counter only";
+  EXPECT_THAT(texts(glue.remarks),
+              ElementsAre("c.st:2:32: late is a TON: a timer begins anew at each start, RETAIN or not"));
 }
 
 TEST_F(MatiecGlue, HasAnotherLayoutIfATypeInItChanges) {
