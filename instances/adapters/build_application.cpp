@@ -20,6 +20,7 @@
 #include "instances/adapters/plcopen/structured_text.hpp"
 #include "instances/adapters/text_files.hpp"
 #include "instances/adapters/translator.hpp"
+#include "instances/adapters/work_folder.hpp"
 
 namespace plchost {
 
@@ -64,10 +65,7 @@ class Build {
         read_source(name);
         continue;
       }
-      std::vector<std::string> files;
-      for (fs::directory_iterator it(name, error), end; !error && it != end; it.increment(error)) {
-        if (iec::folded(it->path().extension().string()) == ".ST") files.push_back(it->path());
-      }
+      std::vector<std::string> files = files_in(name, error);
       if (error) {
         context_.fail({{name, 0, 0}, fmt::format("this folder cannot be read: {}", error.message())});
         continue;
@@ -77,6 +75,20 @@ class Build {
       for (const std::string& file : files) read_source(file);
     }
     return context_.good();
+  }
+  // *.st, also in its folders; but for hidden ones, and what an earlier build has left.
+  [[nodiscard]] static std::vector<std::string> files_in(const std::string& folder, std::error_code& error) {
+    std::vector<std::string> files;
+    for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+      std::error_code none;  // a link that leads nowhere is no folder
+      if (it->is_directory(none)) {
+        const bool is_hidden = it->path().filename().string().starts_with('.');
+        if (is_hidden || WorkFolder::is_kept(it->path())) it.disable_recursion_pending();
+      } else if (iec::folded(it->path().extension().string()) == ".ST") {
+        files.push_back(it->path());
+      }
+    }
+    return files;
   }
   void read_source(const std::string& file) {
     auto read = read_text_file(file, kMaxSource);
@@ -135,18 +147,38 @@ class Build {
         context_.sources | std::views::take(kShown) | std::views::transform(&iec::Source::file);
     return fmt::format("{}{}", fmt::join(names, ", "), std::ssize(context_.sources) > kShown ? ", ..." : "");
   }
+  // Of a single source line.st: line.toml. Of a single folder line: line.toml beside it, or tasks.toml in it.
+  [[nodiscard]] std::vector<fs::path> task_files() const {
+    std::vector<fs::path> found;
+    if (order_.sources.size() != 1) return found;
+    std::error_code error;
+    const auto add = [&](const fs::path& file) {
+      if (fs::is_regular_file(file, error) && std::ranges::find(found, file) == found.end())
+        found.push_back(file);
+    };
+    const fs::path source = order_.sources.front();
+    if (fs::is_directory(source, error)) {
+      add(source / "tasks.toml");
+      const fs::path folder = fs::absolute(source, error).lexically_normal();
+      add((folder.has_filename() ? folder : folder.parent_path()).string() + ".toml");
+    }
+    if (context_.sources.size() == 1) add(fs::path(context_.sources.front().file).replace_extension(".toml"));
+    return found;
+  }
   void read_task_file() {
     std::string file = order_.tasks;
-    if (file.empty() && context_.sources.size() == 1) {
-      std::error_code error;
-      const std::string& source = context_.sources.front().file;
-      const fs::path beside = fs::path(source).replace_extension(".toml");
-      if (!fs::is_regular_file(beside, error)) return;
-      file = beside;
+    if (file.empty()) {
+      const std::vector<fs::path> found = task_files();
+      if (found.size() > 1) {
+        return context_.fail(
+            {{found[0].string(), 0, 0},
+             fmt::format("and {} may both be the task file: choose by --tasks", found[1].string())});
+      }
+      if (found.empty()) return;
+      file = found.front();
       context_.report.remarks.push_back(
-          {{file, 0, 0}, fmt::format("is read as the task file of {}, as it lies beside it", source)});
+          {{file, 0, 0}, fmt::format("is read as the task file of {}", order_.sources.front())});
     }
-    if (file.empty()) return;
     auto read = read_text_file(file, kMaxTaskFile);
     if (!context_.has(read)) return;
     identities_.push_back(read->identity);

@@ -16,8 +16,9 @@ inline constexpr std::array kCompilers{"matiec", "strucpp"};
 
 /// The order to `plcctl build application`.
 struct BuildOrder {
-  std::vector<std::string> sources;  ///< files (ST, or PLCopen XML), and folders whose *.st are meant
-  std::string tasks = {};            ///< task file; empty: X.toml beside a single source X.st, if it is there
+  std::vector<std::string> sources;  ///< files (ST, or PLCopen XML), and folders: their *.st, at any depth
+  /// Task file; empty: of a single source X.st, or folder X, X.toml beside it; also tasks.toml in the folder.
+  std::string tasks = {};
   std::string output;  ///< the application: line.so. Of several resources each has its name in it
   std::string compiler =
       {};                    ///< of kCompilers; empty: the one of which the folder is named, or that is there

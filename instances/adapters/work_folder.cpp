@@ -83,10 +83,16 @@ Result<WorkFolder> WorkFolder::make_kept(const std::string& path) {
   }
   for (const std::string& name : present) {
     fs::remove(folder.path_ / name, error);
-    if (error) return failure(ErrorCode::system, fmt::format("remove {}/{}", path, name), error.value());
+    if (error)
+      return failure(ErrorCode::system, fmt::format("cannot remove {}/{}", path, name), error.value());
   }
   PLCHOST_TRY(folder.mark());
   return folder;
+}
+
+bool WorkFolder::is_kept(const fs::path& folder) {
+  std::error_code error;
+  return fs::exists(folder / kMarker, error);
 }
 
 WorkFolder::~WorkFolder() {

@@ -17,6 +17,8 @@ class WorkFolder {
   /// One that the user names, and that stays: a new one, an empty one, or one of an earlier build, whose
   /// files are removed. A marker in it lists them. wrong_state: it has files that no build has left.
   [[nodiscard]] static Result<WorkFolder> make_kept(const std::string& path);
+  /// Whether make_kept() has made it once.
+  [[nodiscard]] static bool is_kept(const std::filesystem::path& folder);
   WorkFolder(WorkFolder&& other) noexcept : path_(std::exchange(other.path_, {})), kept_(other.kept_) {}
   WorkFolder& operator=(WorkFolder&&) = delete;
   WorkFolder(const WorkFolder&) = delete;

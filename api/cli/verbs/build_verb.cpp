@@ -51,15 +51,16 @@ void add_build_verb(const Command& plcctl, CliSession& session) {
             "Translate Structured Text, or PLCopen XML with bodies in it, with MATIEC or STruC++. Each TASK "
             "becomes a task, located variables lie in the areas inputs, outputs and memory",
             [&session, order] { return build(session, *order); })
-      .arguments(
-          "SOURCE", order->sources,
-          "files (*.xml: PLCopen XML), or folders whose *.st are meant; one CONFIGURATION in all of them")
+      .arguments("SOURCE", order->sources,
+                 "files (*.xml: PLCopen XML), or folders, of which the *.st at any depth are meant; one "
+                 "CONFIGURATION "
+                 "in all of them")
       .file("-o,--application", order->output,
             "where the application goes; of several resources each has its name in it")
       .option(
           "--tasks", order->tasks,
           "external events, watchdogs and other options of the tasks, as TOML (else X.toml beside a single "
-          "X.st or X.xml)",
+          "X.st, X.xml or folder X, or tasks.toml in that folder)",
           "")
       .word("--compiler", order->compiler,
             "matiec or strucpp (else the one of which the folder is named, or that is found, first MATIEC)",

@@ -35,6 +35,7 @@ class BuildParts : public testing::Test {
   ~BuildParts() override { fs::remove_all(folder_); }
   [[nodiscard]] std::string path(const std::string& name) const { return folder_ + "/" + name; }
   std::string put(const std::string& name, const std::string& text) const {
+    fs::create_directories(fs::path(path(name)).parent_path());
     std::ofstream(path(name)) << text;
     return path(name);
   }
@@ -177,7 +178,7 @@ CONFIGURATION c RESOURCE r ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); PROG
   EXPECT_THAT(said(source, ""), HasSubstr("is one of the files that are read"));
   EXPECT_THAT(said(path("other.so"), ""), HasSubstr("is one of the files that are read"));
   EXPECT_THAT(said(path("line.so"), path("")), HasSubstr("lies in the folder of --keep"));
-  EXPECT_THAT(said(path("line.so"), ""), HasSubstr("there is no iec2c"));
+  EXPECT_THAT(said(path("line.so"), ""), HasSubstr("there is no built MATIEC"));
 }
 
 TEST_F(BuildParts, SourcesWithoutAConfigurationAreNamed) {
@@ -202,6 +203,57 @@ TEST_F(BuildParts, SourcesWithoutAConfigurationAreNamed) {
   fs::permissions(put("matiec/iec2c", "#!/bin/sh\necho 'joined.st:1-41..1-41: error: wrong'\nexit 1\n"),
                   fs::perms::owner_all);
   EXPECT_EQ(said({one}, path("matiec")), one + ":1:40: wrong");
+}
+
+TEST_F(BuildParts, OfAFolderTheSourcesAtAnyDepthAreTaken) {
+  const std::string one = put("line/press/one.ST", "TYPE Mode : INT; END_TYPE\n");
+  const std::string two = put("line/two.st", "TYPE Kind : INT; END_TYPE\n");
+  (void)put("line/note.txt", "no source");
+  (void)put("line/.git/three.st", "hidden");
+  (void)put("line/made/joined.st", "of an earlier build");
+  (void)put("line/made/.plchost-build", "");
+  const BuildReport report = build_application({.sources = {path("line")},
+                                                .output = path("line.so"),
+                                                .matiec = "/nowhere",
+                                                .adapters = "",
+                                                .keep = "",
+                                                .check_program = ""});
+  ASSERT_EQ(report.problems.size(), 1U);
+  EXPECT_THAT(report.problems.front().text,
+              HasSubstr("there is no CONFIGURATION in " + one + ", " + two + ";"));
+}
+
+TEST_F(BuildParts, ATaskFileLiesBesideASourceOrInItsFolder) {
+  const std::string source = put("line/a.st", R"(
+PROGRAM Main VAR a : INT; END_VAR a := 1; END_PROGRAM
+CONFIGURATION c RESOURCE r ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); PROGRAM p WITH t : Main; END_RESOURCE END_CONFIGURATION
+)");
+  const auto said = [&](const std::string& from) {
+    const BuildReport report = build_application({.sources = {from},
+                                                  .output = path("line.so"),
+                                                  .matiec = "/nowhere",
+                                                  .adapters = "",
+                                                  .keep = "",
+                                                  .check_program = ""});
+    std::string text;
+    for (const auto& remark : report.remarks) text += iec::describe(remark) + "\n";
+    return report.problems.empty() ? text : text + iec::describe(report.problems.front());
+  };
+  const auto alone = [&](const std::string& name, const std::string& from) {
+    const std::string file = put(name, "");
+    const std::string text = said(from);
+    fs::remove(file);
+    return text.starts_with(file + ": is read as the task file of " + from);
+  };
+  EXPECT_TRUE(alone("line/a.toml", source));
+  EXPECT_TRUE(alone("line/a.toml", path("line")));
+  EXPECT_TRUE(alone("line/tasks.toml", path("line")));
+  EXPECT_TRUE(alone("line.toml", path("line")));
+  EXPECT_TRUE(alone("line.toml", path("line/")));
+  EXPECT_FALSE(alone("line/tasks.toml", source));
+  const std::string one = put("line/tasks.toml", "");
+  const std::string two = put("line.toml", "");
+  EXPECT_EQ(said(path("line")), one + ": and " + two + " may both be the task file: choose by --tasks");
 }
 
 TEST_F(BuildParts, OfTwoConfigurationsTheSecondOneIsTold) {
@@ -232,20 +284,75 @@ class TranslatedByStrucpp : public BuildParts {
       GTEST_SKIP() << "needs node";
   }
   std::string said(std::vector<std::string> sources, const std::string& body_of_compile) {
+    const BuildReport report = build(std::move(sources), body_of_compile);
+    return report.problems.empty() ? "" : iec::describe(report.problems.front());
+  }
+  BuildReport build(std::vector<std::string> sources, const std::string& body_of_compile) {
     (void)put("strucpp/dist/node/index.js",
               "exports.discoverStlibs = () => [];\nexports.compile = (source, options) => {" +
                   body_of_compile + "};\n");
-    const BuildReport report = build_application({.sources = std::move(sources),
-                                                  .output = path("line.so"),
-                                                  .compiler = "strucpp",
-                                                  .matiec = "",
-                                                  .strucpp = path("strucpp"),
-                                                  .adapters = ADAPTERS,
-                                                  .keep = "",
-                                                  .check_program = ""});
-    return report.problems.empty() ? "" : iec::describe(report.problems.front());
+    return build_application({.sources = std::move(sources),
+                              .output = path("line.so"),
+                              .compiler = "strucpp",
+                              .matiec = "",
+                              .strucpp = path("strucpp"),
+                              .adapters = ADAPTERS,
+                              .keep = path("kept"),
+                              .check_program = ""});
   }
 };
+
+// As if it had translated no program.
+constexpr const char* kNothing =
+    "return {success: true, errors: [], warnings: [], headerCode: '', cppFiles: [], projectModel: {}, "
+    "symbolTables: {}, "
+    "ast: {functionBlocks: [], functions: [], types: [], programs: [], interfaces: [], configurations: [], "
+    "globalVarBlocks: [{declarations: [{names: ['OUTSIDE'], type: {name: 'INT'}}]}]}};";
+
+TEST_F(TranslatedByStrucpp, AWordThatItTakesForAnotherOneIsRefused) {
+  const std::string one = put("one.st", "PROGRAM p\nVAR PERSISTENT a : INT; END_VAR\nEND_PROGRAM\n");
+  EXPECT_THAT(said({one}, kNothing), HasSubstr(one + ":2:5: PERSISTENT: STruC++ does not know this word"));
+}
+
+TEST_F(TranslatedByStrucpp, OfManyMessagesTheOthersAreCounted) {
+  const std::string one = put("one.st", "PROGRAM p\nEND_PROGRAM\n");
+  const auto errors = [](int count) {
+    return "return {success: false, warnings: [], errors: Array.from({length: " + std::to_string(count) +
+           "}, (_, i) => ({message: `${i}`, line: 1, column: i, file: '/one'}))};";
+  };
+  const BuildReport report = build({one}, errors(137));
+  ASSERT_EQ(report.problems.size(), 101U);
+  EXPECT_EQ(report.problems.back().text, "37 more messages of this kind are not told");
+  EXPECT_EQ(build({one}, errors(100)).problems.size(), 100U);
+}
+
+TEST_F(TranslatedByStrucpp, AVariableOfAnInterfaceIsToldWhereItIsDeclared) {
+  const std::string one = put("one.st", "INTERFACE Runs END_INTERFACE (* a : Runs *)\n");
+  const std::string two = put("two.st", "PROGRAM p\nVAR a : INT; b, c : RUNS; END_VAR\nEND_PROGRAM\n");
+  const std::string ends =
+      "throw new TypeError(\"Cannot read properties of undefined (reading 'definition')\");";
+  EXPECT_EQ(said({one, two}, ends), two + ":2:17: STruC++ knows no variables of an interface");
+  EXPECT_THAT(said({one}, ends), HasSubstr(one + ": Cannot read properties"));
+}
+
+TEST_F(TranslatedByStrucpp, VariablesOutsideOfItsTableAreInThePlan) {
+  (void)put("strucpp/dist/backend/debug-table-gen.js", R"(
+exports.generateDebugTable = ({configurations}) => ({
+  debugTableCpp: configurations.flatMap(({varBlocks}) => varBlocks.flatMap(({declarations}) => declarations.flatMap(({names}) => names)))
+    .map((name) => `    { (void*)&${name}.value, TAG_INT, 0 },  // ${name}`).join('\n'),
+  skipped: [{path: 'ONE.CAL[1].X', reason: 'library type Calendar is opaque to the debugger'},
+            {path: 'ONE.CAL[2].X', reason: 'library type Calendar is opaque to the debugger'},
+            {path: 'ONE.A', reason: 'array bounds not constant'}, {path: 'B', reason: 'other'}],
+}))");
+  (void)build({put("one.st", "PROGRAM p\nEND_PROGRAM\n")}, kNothing);
+  const std::string plan = read(path("kept/plan.json"));
+  EXPECT_THAT(plan,
+              HasSubstr(R"("symbols":[{"name":"OUTSIDE","type":"INT","value":"OUTSIDE","bounds":[]}])"));
+  EXPECT_THAT(plan,
+              HasSubstr(R"("hidden":[{"name":"ONE.CAL[].X","why":"its type Calendar is one of a library"},)"
+                        R"({"name":"ONE.A","why":"its bounds are no numbers"},)"
+                        R"({"name":"B","why":"STruC++ leaves it out: other"}])"));
+}
 
 TEST_F(TranslatedByStrucpp, ACharacterThatIsNotExpectedIsToldAtItsPlace) {
   const std::string one = put("one.st", "TYPE\nEND_TYPE\n");
