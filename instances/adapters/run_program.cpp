@@ -105,7 +105,7 @@ class Child {
 Result<ProgramEnd> run_program(const std::vector<std::string>& arguments, const std::string& folder,
                                const RunLimits& limits) {
   std::array<int, 2> ends{};
-  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return failure(ErrorCode::system, "make a pipe", errno);
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) return failure(ErrorCode::system, "cannot make a pipe", errno);
   UniqueFd output(ends[0]);
   UniqueFd childs(ends[1]);
   ::fcntl(output.get(), F_SETFL, O_NONBLOCK);
@@ -121,7 +121,7 @@ Result<ProgramEnd> run_program(const std::vector<std::string>& arguments, const 
   pid_t pid = 0;
   const int error =
       ::posix_spawnp(&pid, words.front(), &files.actions, &group.attributes, words.data(), environ);
-  if (error != 0) return failure(ErrorCode::not_found, "start " + arguments.front(), error);
+  if (error != 0) return failure(ErrorCode::not_found, arguments.front(), error);
   childs.reset();
   return Child(pid, std::move(output)).run(limits);
 }
