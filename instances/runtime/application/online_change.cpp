@@ -52,8 +52,7 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                std::chrono::duration<double>(kLongestSetup).count()));
   }
   PLCHOST_TRY(change->compare(next.declaration));
-  change->variables_ =
-      context.host.variables().prepare(next.declaration.seen.take());
+  change->variables_ = context.host.variables().prepare(next.declaration.seen.take());
   PLCHOST_TRY_ASSIGN(auto commit, Commit::prepare(context, change->next_, std::move(next.declaration)));
   change->commit_.emplace(std::move(commit));
   change->connect();
