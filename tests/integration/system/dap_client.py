@@ -203,7 +203,7 @@ def text(port, source):
     assert client.ask("evaluate", expression="x", frameId=frames[0]["id"])["result"] == "1002"
     assert globals_["name"] == "Globals", globals_
     shown = client.ask("variables", variablesReference=globals_["variablesReference"])["variables"]
-    assert [(one["name"].lower(), one["value"]) for one in shown] == [("limit", "20000")], shown
+    assert [(one["name"].lower(), one["value"]) for one in shown] == [("most", "20000")], shown
     client.ask("stepOut", threadId=main)
     client.event("stopped")
     client.ask("next", threadId=main)

@@ -27,17 +27,17 @@ END_FUNCTION_BLOCK
 PROGRAM Press
   VAR
     one : Counter; doubled : INT; last : ARRAY [1..3] OF INT;
-  END_VAR VAR_EXTERNAL limit : INT; END_VAR
+  END_VAR VAR_EXTERNAL most : INT; END_VAR
   one(inc := 1);
   doubled := Twice(one.n);
-  IF doubled > limit THEN
+  IF doubled > most THEN
     doubled := 0;
   END_IF;
   last[2] := doubled;
 END_PROGRAM
 
 CONFIGURATION cell
-  VAR_GLOBAL limit : INT := 20000; END_VAR
+  VAR_GLOBAL most : INT := 20000; END_VAR
   RESOURCE line ON PLC
     TASK Main (INTERVAL := T#10ms, PRIORITY := 1);
     PROGRAM press1 WITH Main : Press;
