@@ -24,9 +24,8 @@ constexpr std::array kOfSanitizers = {
     // Programs.
     RefusedCall{SYS_execve, "execve"},
     RefusedCall{SYS_execveat, "execveat"},
-    // The memory of other processes.
+    // The memory of other processes. Not process_vm_readv: a fault in a task reads its own stack by it.
     RefusedCall{SYS_ptrace, "ptrace"},
-    RefusedCall{SYS_process_vm_readv, "process_vm_readv"},
     RefusedCall{SYS_process_vm_writev, "process_vm_writev"},
 };
 constexpr std::string_view kExceptions;

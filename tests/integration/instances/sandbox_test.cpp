@@ -43,22 +43,20 @@ class SandboxOfSockets : public SandboxedInstance {
   void SetUp() override {
     if (kSanitized) GTEST_SKIP() << "with a sanitizer its application becomes a shell";
   }
-  void has_said(const InstanceProcess& sut, int of_cycle) {
-    const auto has = [&](const std::string& line) {
-      EXPECT_TRUE(eventually([&] { return sut.log().contains(line + "\n"); })) << line << "\n" << sut.log();
-    };
-    has(fmt::format("program {}", EPERM));
-    has("socket in the set-up 0");
-    has("own socket 0");
-    has(fmt::format("socket in a cycle {}", of_cycle));
-    has(fmt::format("socket of a thread {}", of_cycle));
+  static bool has_said(const InstanceProcess& sut, int of_cycle) {
+    return eventually([&] {
+      return sut.log().contains(fmt::format("program {}\n", EPERM)) &&
+             sut.log().contains("socket in the set-up 0\n") && sut.log().contains("own socket 0\n") &&
+             sut.log().contains(fmt::format("socket in a cycle {}\n", of_cycle)) &&
+             sut.log().contains(fmt::format("socket of a thread {}\n", of_cycle));
+    });
   }
 };
 
 TEST_F(SandboxOfSockets, IsOpenByDefaultAndStartsNoProgram) {
   InstanceProcess sut(sandbox, with("", "confined"));
   sut.wait_until_up();
-  has_said(sut, 0);
+  EXPECT_TRUE(has_said(sut, 0)) << sut.log();
   EXPECT_THAT(sut.log(), AllOf(HasSubstr("seccomp: no programs"), Not(HasSubstr("no new sockets"))));
   EXPECT_EQ(status_of(sut.pid(), "NoNewPrivs:"), "NoNewPrivs:\t1");
   EXPECT_EQ(sut.end(SIGTERM), 0);
@@ -67,7 +65,7 @@ TEST_F(SandboxOfSockets, IsOpenByDefaultAndStartsNoProgram) {
 TEST_F(SandboxOfSockets, IsClosedWhenTheApplicationStarts) {
   InstanceProcess sut(sandbox, with("NoSockets", "confined"));
   sut.wait_until_up();
-  has_said(sut, EPERM);
+  EXPECT_TRUE(has_said(sut, EPERM)) << sut.log();
   EXPECT_THAT(sut.log(), AllOf(HasSubstr("seccomp: no programs"), HasSubstr("seccomp: no new sockets")));
   EXPECT_EQ(sut.end(SIGTERM), 0);
 }
