@@ -120,6 +120,9 @@ class Growth(unittest.TestCase):
     def test_up_and_down_is_none(self):
         self.assertTrue(self.series([10 + at % 3 for at in range(100)]).is_flat())
 
+    def test_is_not_told_of_a_minute(self):
+        self.assertTrue(self.series([10 + 10 * at for at in range(7)]).is_flat())
+
     def test_of_no_samples_is_none(self):
         self.assertTrue(self.series([]).is_flat())
 

@@ -53,6 +53,7 @@ class FullDisks(Campaign):
         return Host([*self.steady, *self.faulty], state=self.disk / "state")
 
     def begin(self):
+        self.host.client.register_event(self.host.name, "line2/kept")  # so that the files for registered events are there already
         self.host.client.register_event(self.host.name, "line2/extra")
         self.registered, self.refused, self.answered = True, 0, 0
 

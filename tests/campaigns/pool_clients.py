@@ -10,7 +10,6 @@ import mmap
 import os
 import random
 import signal
-import struct
 import subprocess
 import sys
 import time
@@ -21,6 +20,7 @@ from load import load_pool_library
 
 BATCH = 10
 OBJECTS = "victim/"  # with which the names of their objects begin
+BEGUN, ENDED, CONNECTED = range(3)  # posts of all clients, and whether the newest one is connected
 
 
 class PoolClients(Campaign):
@@ -81,15 +81,14 @@ def live(library, pool_name, event_name, marks, chance):
     pool, event, made = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
     if library.plc_pool_open(pool_name, 1, ctypes.byref(pool)) < 0 or library.plc_event_open(pool, event_name, 1, ctypes.byref(event)) < 0:
         return
-    struct.pack_into("<Q", marks, 16, 1)
+    marks[CONNECTED] = 1
     while True:
         what = chance.randrange(6)
         name = f"{OBJECTS}{chance.randrange(8)}".encode()
         if what < 2:
-            begun, ended = struct.unpack_from("<QQ", marks)
-            struct.pack_into("<Q", marks, 0, begun + 1)
+            marks[BEGUN] += 1
             library.plc_event_post(event)
-            struct.pack_into("<Q", marks, 8, ended + 1)
+            marks[ENDED] += 1
         elif what == 2:
             library.plc_event_create(pool, name + b"e", None, ctypes.byref(made))
             if chance.random() < 0.5 and made:
@@ -112,21 +111,22 @@ def nursery(pool_name, event_name):
     library.plc_mutex_lock.argtypes = [ctypes.c_void_p, ctypes.c_long]
     for name in ("plc_mutex_unlock", "plc_mutex_close", "plc_semaphore_close", "plc_memory_close"):
         getattr(library, name).argtypes = [ctypes.c_void_p]
-    marks = mmap.mmap(-1, 4096)  # posts begun, posts ended, whether the client is connected
+    # Of ctypes, which writes a number by one store: a client is killed before it or behind it.
+    marks = (ctypes.c_uint64 * 3).from_buffer(mmap.mmap(-1, 4096))
     pool = ctypes.c_void_p()
     if library.plc_pool_open(pool_name, 1, ctypes.byref(pool)) < 0:
         sys.exit(library.plc_pool_error().decode())
     for line in sys.stdin:
         faults, longest = [], 0.0
         for _ in range(int(line)):
-            struct.pack_into("<Q", marks, 16, 0)
+            marks[CONNECTED] = 0
             child = os.fork()
             if child == 0:
                 live(library, pool_name, event_name, marks, random.Random(chance.random()))
                 os._exit(1)
             # Some are killed while they connect.
             end = time.monotonic() + (chance.uniform(0, 0.004) if chance.random() < 0.2 else 5)
-            while not struct.unpack_from("<Q", marks, 16)[0] and time.monotonic() < end:
+            while not marks[CONNECTED] and time.monotonic() < end:
                 time.sleep(0.0002)
             time.sleep(chance.uniform(0, 0.002))
             os.kill(child, signal.SIGKILL)
@@ -140,8 +140,7 @@ def nursery(pool_name, event_name):
             else:
                 library.plc_semaphore_close(made)
             longest = max(longest, time.monotonic() - began)
-        begun, ended = struct.unpack_from("<QQ", marks)
-        print(json.dumps({"begun": begun, "ended": ended, "longest_ms": longest * 1000, "faults": faults}), flush=True)
+        print(json.dumps({"begun": marks[BEGUN], "ended": marks[ENDED], "longest_ms": longest * 1000, "faults": faults}), flush=True)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ WIDTH, HEIGHT = 760, 220
 LEFT, RIGHT, TOP, BOTTOM = 80, 150, 30, 30
 COLOURS = ["#1f5fa8", "#c4501b", "#2f8f4e", "#7b4ab0", "#8a6d1c", "#444444"]
 WARM_UP = 0.25  # of the samples, which do not count: all caches fill in that time
+TELLING = 240  # s of samples that tell a growth from the size of a process that was just started
 
 
 def slope(points):
@@ -43,8 +44,12 @@ class Series:
     def per_hour(self):
         return slope(self.settled()) * 3600
 
+    def is_long(self):
+        points = self.settled()
+        return bool(points) and points[-1][0] - points[0][0] >= TELLING
+
     def is_flat(self):
-        return self.growth() <= self.bound()
+        return not self.is_long() or self.growth() <= self.bound()
 
 
 def nice(value):
@@ -99,7 +104,7 @@ def write(folder, summary, series, counts, failures, marks):
               "least step that says anything.", "",
               table(["resource", "unit", "first", "last", "growth", "bound", "per hour", "flat"],
                     [[f"{one.group}: {one.name}", one.unit, nice(one.points[0][1]), nice(one.points[-1][1]), nice(one.growth()), nice(one.bound()),
-                      nice(one.per_hour()), "yes" if one.is_flat() else "NO"] for one in series if one.points]), ""]
+                      nice(one.per_hour()), "NO" if not one.is_flat() else "yes" if one.is_long() else "too short to tell"] for one in series if one.points]), ""]
     for group, members in groups.items():
         file = group.replace(" ", "_") + ".svg"
         (folder / file).write_text(plot(group, members[0].unit, members, marks), encoding="utf-8")

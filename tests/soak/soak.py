@@ -46,7 +46,7 @@ class Soak:
         self.options = options
         tasks = max(0, -(-options.tasks // options.instances) - OWN_TASKS)
         # A storm is more than a task may lag behind. It must count the posts that it drops.
-        settings = ["[CmpSchedule]", "ExternalEvent.MaxBacklog=2000", "[Application]", f"Parameter.Tasks={tasks}", "[SysTimer]", "Linux.IdleStates=Allow"]
+        settings = ["[CmpSchedule]", "ExternalEvent.MaxBacklog=200", "[Application]", f"Parameter.Tasks={tasks}", "[SysTimer]", "Linux.IdleStates=Allow"]
         keys = ["crash_limit = 100", "crash_window_s = 1", "restart_delay_ms = 50"]
         instances = [Instance(f"line{number}", CORES[number % len(CORES)], settings=settings, keys=keys) for number in range(options.instances)]
         self.steady, self.others = instances[: len(instances) // 2], instances[len(instances) // 2:]
