@@ -137,7 +137,8 @@ class Campaign:
         ended = Counts(self)
         self.stop_load()
         result = {"faults": self.done * self.each, **self.of_cycles(before, after, ended)}
-        # Of single faults. A witness may see a stall one fault later.
+        # A witness may see a stall one fault later.
+        result["lost_in_single_faults"] = sum(lost for lost, _, _ in worst)
         result["worst"] = [f"{lost} cycles at fault {number} ({kind})" for lost, number, kind in sorted(worst, reverse=True)[:TOLD] if lost]
         if self.counts_events:
             result.update(self.of_events())
@@ -204,7 +205,7 @@ def sentence(result):
     left = ", ".join(f"{count} {kind}" for kind, count in result.get("left", {}).items() if count) or "nothing"
     return (f"{result['campaign']}: {result['faults']:,} faults in {result.get('seconds', 0):,} s; "
             f"{result.get('lost_beyond_control', '?')} cycles lost beyond control ({result.get('lost_cycles', '?')} lost of {result.get('cycles', 0):,}, "
-            f"{result.get('taken_by_machine', '?')} taken by the machine); "
+            f"{result.get('taken_by_machine', '?')} taken by the machine, {result.get('lost_in_single_faults', '?')} beyond that in single faults); "
             f"{result.get('posts', 0):,} posts, {result.get('events_lost', '-')} lost, {result.get('events_doubled', '-')} doubled; left: {left}; "
             f"{'passed' if result['passed'] else 'FAILED'}")
 

@@ -20,7 +20,8 @@ def slope(points):
 
 
 class Series:
-    """A resource over time. It is flat if the line through its samples rises by no more than `bound` from their begin to their end."""
+    """A resource over time. It is flat if the line through its samples rises by no more than `bound` from their begin to their end.
+    `least` is the least bound; infinite: it is a figure that nobody judges."""
 
     def __init__(self, group, name, unit, least):
         self.group, self.name, self.unit, self.least = group, name, unit, least
@@ -104,7 +105,7 @@ def write(folder, summary, series, counts, failures, marks):
               "least step that says anything.", "",
               table(["resource", "unit", "first", "last", "growth", "bound", "per hour", "flat"],
                     [[f"{one.group}: {one.name}", one.unit, nice(one.points[0][1]), nice(one.points[-1][1]), nice(one.growth()), nice(one.bound()),
-                      nice(one.per_hour()), "NO" if not one.is_flat() else "yes" if one.is_long() else "too short to tell"] for one in series if one.points]), ""]
+                      nice(one.per_hour()), "NO" if not one.is_flat() else "yes" if one.is_long() else "too short to tell"] for one in series if one.points and one.least < float("inf")]), ""]
     for group, members in groups.items():
         file = group.replace(" ", "_") + ".svg"
         (folder / file).write_text(plot(group, members[0].unit, members, marks), encoding="utf-8")

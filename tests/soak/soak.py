@@ -24,6 +24,8 @@ SAMPLE = 2.0  # s between two samples
 COMPARE = 30.0  # s between two comparisons of all counts, for which nobody posts
 SCHEDULERS = ("CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot")
 VERSIONS = ("counting_line", "counting_line_2")
+AUDIT_MIB = 64 * 16  # api/audit.md
+KEPT = 3  # files for each instance: loaded, boot application, and one more (application_versions)
 BACK = 60  # s in which an instance that is not steady must run again
 
 
@@ -51,7 +53,8 @@ class Soak:
         instances = [Instance(f"line{number}", CORES[number % len(CORES)], settings=settings, keys=keys) for number in range(options.instances)]
         self.steady, self.others = instances[: len(instances) // 2], instances[len(instances) // 2:]
         self.tasks = options.instances * (tasks + OWN_TASKS)
-        self.host = Host(instances)
+        self.host = Host(instances, keys=["application_versions = 1"])
+        self.application_mib = (APPLICATIONS / f"{VERSIONS[0]}.so").stat().st_size / 2**20 + 0.1
         self.failures, self.counts, self.series, self.marks = [], {}, {}, {}
         self.ended = threading.Event()
         self.killing = threading.Lock()  # held while a manager or an API server is gone
@@ -121,15 +124,23 @@ class Soak:
         memories = sum((SHARED_MEMORY / name).stat().st_blocks for name in self.host.memories() if (SHARED_MEMORY / name).exists())
         self.add("shared memory", "all", "MiB", at, memories / 2048, 2)
         self.add("shared memories", "all", "files", at, len(traces["shared_memory"]), 4)
-        audit = f"audit.{self.host.name}"
-        for name, wanted in (("audit log", True), ("all but the audit log", False)):
-            size = sum(path.stat().st_blocks for folder in (self.host.run, self.host.state) for path in folder.rglob("*")
-                       if path.is_file() and (audit in path.parts) == wanted)
-            # The log of changes grows up to its own bound (audit.md).
-            self.add("disk", name, "MiB", at, size / 2048, 1024 if wanted else 2)
-        lost = sum(self.host.boards[one.name].lost for one in self.steady)
-        self.add("lost cycles", "steady instances", "cycles", at, lost - self.lost_before, float("inf"))
-        self.add("lost cycles", "taken by the machine", "cycles", at, sum(witness.taken() for witness in self.witnesses.values()), float("inf"))
+        sizes = {"audit": 0, "applications": 0, "": 0}  # MiB, by how the folder's name begins
+        for path in [*self.host.run.rglob("*"), *self.host.state.rglob("*")]:
+            if path.is_file():
+                begin = next((begin for begin in sizes if begin and any(part.startswith(begin + ".") for part in path.parts)), "")
+                sizes[begin] += path.stat().st_blocks / 2048
+        # The first two have bounds of their own, which they come to in time.
+        self.add("disk", "audit log", "MiB", at, sizes["audit"], AUDIT_MIB)
+        self.add("disk", "kept applications", "MiB", at, sizes["applications"], KEPT * len(self.others) * self.application_mib)
+        self.add("disk", "all others", "MiB", at, sizes[""], 2)
+        lost, taken = self.lost_cycles()
+        self.add("lost cycles", "steady instances", "cycles", at, lost, float("inf"))
+        self.add("lost cycles", "taken by the machine", "cycles", at, taken, float("inf"))
+
+    def lost_cycles(self):
+        """Of the steady instances; and those that the machine took from them, from each on its core."""
+        taken = {core: witness.taken() for core, witness in self.witnesses.items()}
+        return sum(self.host.boards[one.name].lost for one in self.steady) - self.lost_before, sum(taken[one.core] for one in self.steady)
 
     def add(self, group, name, unit, at, value, least):
         self.series.setdefault((group, name), report.Series(group, name, unit, least)).add(at, value)
@@ -269,7 +280,7 @@ class Soak:
                 poster.stop()
             self.counts["cycles of the steady instances"] = sum(
                 self.host.boards[one.name].cycles + self.host.boards[one.name].other_cycles() for one in self.steady)
-            self.counts["lost cycles of the steady instances"] = sum(self.host.boards[one.name].lost for one in self.steady) - self.lost_before
+            self.counts["lost cycles of the steady instances"], self.counts["cycles that the machine took from them"] = self.lost_cycles()
             for what in self.host.stop():
                 self.fail(f"left at the end: {what}")
             return self.report()
