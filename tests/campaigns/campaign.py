@@ -24,6 +24,7 @@ from load import CommandPoster, DdsPoster, Ledger, PoolPoster, Witness, compare
 SKIPPED = 77
 CONTROL = 60  # s: the longest control run
 ROUNDS = 3  # of a share: a stall of the machine takes cycles after its end, too
+SETTLED = 10  # s: by then all traces of the faults are gone
 TOLD = 5  # of the worst faults
 
 
@@ -170,13 +171,13 @@ class Campaign:
         """The traces of the faults on the machine, and those of the host when it has ended."""
         left, words = {}, []
         if self.counts_traces:
-            def nothing():
-                return not any(left_between(before, self.host.traces())[0].values())
-            try:
-                until("nothing is left", nothing, 10)
-            except Failed:
-                pass  # the counts tell
-            left, words = left_between(before, self.host.traces())
+            # Again, as each process opens and makes files for a moment.
+            end = time.monotonic() + SETTLED
+            while True:
+                left, words = left_between(before, self.host.traces())
+                if not words or time.monotonic() > end:
+                    break
+                time.sleep(0.05)
         self.end()
         at_end = self.host.stop()
         for what in [*words, *at_end]:
