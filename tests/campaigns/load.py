@@ -145,6 +145,7 @@ def compare(host, ledgers, patience=10):
             faults.append(f"{one.name}: {one.acknowledged} posts acknowledged, {one.uncertain} uncertain, {posts} in the pool; {runs} runs; "
                           f"the task tells of {cycles} cycles and {told} lost events")
         faults += [f"{one.name}: {fault}" for fault in one.faults[:TOLD]]
+        one.faults.clear()
     return {"posts": sum(one.acknowledged for one in ledgers), "posts_uncertain": sum(one.uncertain for one in ledgers), "events_lost": lost,
             "events_told_as_lost": counted, "events_doubled": doubled, "faults": faults}
 
