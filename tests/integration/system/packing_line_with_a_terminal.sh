@@ -36,6 +36,7 @@ start_modbus() {
   others+=("$modbus")
 }
 tell() { echo "$*" >&"$told"; }
+motor_is() { [ "$(asked plcctl read variable packing1 conveyor1.motor --json | jq -r ".[0].value")" = "$1" ]; }
 shows() { [[ $(tail -n 1 "$shown") == *"$1"* ]]; }
 
 for compiler in "${compilers[@]}"; do
@@ -58,9 +59,11 @@ for compiler in "${compilers[@]}"; do
   tell acknowledge 1
   until_true 40 shows "motor 1, fault 0, carton 0, speed 300"
 
-  echo "- plchost-modbus is killed, and goes on when it is started again"
+  echo "- plchost-modbus is killed: the motor stops, and goes on when it is started again"
+  until_true 40 motor_is TRUE
   kill -KILL "$modbus"
   wait "$modbus" 2>/dev/null || true
+  until_true 40 motor_is FALSE
   tell speed 100
   start_modbus
   until_true 40 shows "motor 1, fault 0, carton 0, speed 100"
