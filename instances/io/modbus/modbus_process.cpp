@@ -51,8 +51,8 @@ Result<void> ModbusProcess::add_devices() {
       PLCHOST_TRY(line->claim(device));
     }
     if (!device.tcp.empty() && !device.writes.empty()) {
-      PLCHOST_TRY_ASSIGN(auto outputs, OutputsClaim::take(config_.process.pool, device));
-      outputs_.push_back(std::move(outputs));
+      PLCHOST_TRY_ASSIGN(auto claim, OutputsClaim::take(config_.process.pool, device));
+      outputs_.push_back({.claim = std::move(claim), .device = devices_.back().get()});
     }
     devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
   }
@@ -131,8 +131,9 @@ void ModbusProcess::repair(TimePoint now) {
     const auto repaired = image->repair();
     if (!repaired && repair_pause_.is_over(now)) spdlog::error("{}", repaired.error().describe());
   }
-  for (OutputsClaim& claim : outputs_) {
-    const auto repaired = claim.repair();
+  for (ClaimedOutputs& outputs : outputs_) {
+    const auto repaired = outputs.claim.repair();
+    outputs.device->yield_outputs(!repaired && repaired.error().code == ErrorCode::busy);
     if (!repaired && repair_pause_.is_over(now)) spdlog::error("{}", repaired.error().describe());
   }
 }

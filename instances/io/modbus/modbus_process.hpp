@@ -46,8 +46,12 @@ class ModbusProcess {
   const ModbusConfig& config_;
   StopEvent stop_;
   ImageTable images_;
-  std::map<std::string, std::unique_ptr<Link>> lines_;  ///< by the serial device, or "tcp " and a name
-  std::vector<OutputsClaim> outputs_;                   ///< of devices on TCP
+  struct ClaimedOutputs {
+    OutputsClaim claim;
+    Device* device;
+  };
+  std::map<std::string, std::unique_ptr<Link>> lines_;  ///< by line_of()
+  std::vector<ClaimedOutputs> outputs_;                 ///< of devices on TCP
   std::vector<std::unique_ptr<Device>> devices_;
   std::unique_ptr<Server> server_;
   std::vector<Thread> threads_;

@@ -178,6 +178,49 @@ TEST(ModbusProcess, TheOutputsOfADeviceHaveOneProcess) {
 }
 
 // The end of a host removes the files of its pool.
+// The files of claims in the pool of the plant.
+std::vector<std::filesystem::path> claims(const Plant& plant) {
+  std::vector<std::filesystem::path> found;
+  for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
+    const std::string name = file.path().filename();
+    if (name.starts_with(plant.pool()) && name.find("modbus") != name.rfind("modbus"))
+      found.push_back(file.path());
+  }
+  return found;
+}
+
+// It stands still while its claim is removed, and another process is faster.
+TEST(ModbusProcess, AProcessWhoseClaimAnotherOneHasWritesNoOutputs) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  ModbusProgram first(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  ::kill(first.pid(), SIGSTOP);
+  for (const auto& claim : claims(plant)) std::filesystem::remove(claim);
+  std::string text = device(port);
+  text.replace(text.find("address = 7"), 11, "address = 20");
+  ModbusProgram second(plant, other_file(plant, text), "second.log");
+  EXPECT_TRUE(eventually([&] {
+    plant.put_out(0, 98);
+    return peer.holding(20) == 98;
+  })) << second.log();
+  ::kill(first.pid(), SIGCONT);
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); })) << first.log();
+  EXPECT_TRUE(eventually([&] { return first.logged("is lost: another process writes its outputs"); }));
+  EXPECT_TRUE(
+      eventually([&] { return first.logged(fmt::format("process {} (plchost-modbus", second.pid())); }));
+  const int before = peer.holding(7);
+  EXPECT_TRUE(eventually([&] {
+    plant.put_out(0, 97);
+    return peer.holding(20) == 97;
+  }));
+  EXPECT_EQ(peer.holding(7), before);
+  EXPECT_EQ(second.end(SIGTERM), 0);
+  EXPECT_TRUE(follows(plant, peer, 96)) << "the claim is free: " << first.log();
+  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
+}
+
 TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsRemoved) {
   Plant plant;
   const HeldPort port;
@@ -185,13 +228,7 @@ TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsRemoved) {
   const ModbusProgram first(plant, plant.write(device(port)));
   ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
   remove_pool_memories(plant.pool());
-  ASSERT_TRUE(eventually([&] {
-    for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
-      const std::string name = file.path().filename();
-      if (name.starts_with(plant.pool()) && name.find("modbus") != name.rfind("modbus")) return true;
-    }
-    return false;
-  })) << first.log();
+  ASSERT_TRUE(eventually([&] { return !claims(plant).empty(); })) << first.log();
   ModbusProgram second(plant, other_file(plant, device(port)), "second.log");
   EXPECT_EQ(second.end(), 1);
   EXPECT_THAT(second.log(), HasSubstr("writes the outputs of"));

@@ -53,6 +53,11 @@ void Device::run() {
 }
 
 bool Device::poll() {
+  if (yields_) {
+    const LinkResult yielded = std::unexpected(LinkFailure{.text = "another process writes its outputs"});
+    end_poll(yielded, yielded, {});
+    return true;
+  }
   asked_ = !inputs_.empty();
   const LinkResult written = write_outputs();
   if (!asked_) return false;  // nothing was due, so nothing is known
@@ -257,3 +262,4 @@ void Device::show(const InputImage& image, std::span<std::byte> bytes, TimePoint
 }
 
 }  // namespace plchost::modbus
+  if (yields_) return;

@@ -40,6 +40,9 @@ class Device {
 
   /// This process runs: another value of the counter in the status. Any thread.
   void count() { state_.count(); }
+  /// Another process writes the outputs: nothing is asked, and the device is lost. Or it does no more. Any
+  /// thread.
+  void yield_outputs(bool yields) noexcept { yields_ = yields; }
   /// Puts the status into the bytes of an image, and zeros for inputs that are too old if so configured. Any
   /// thread, within the update of that image. `ended`: the device is polled no more.
   void show(const InputImage& image, std::span<std::byte> bytes, TimePoint now, bool ended = false) const;
@@ -90,4 +93,5 @@ class Device {
   LogPause log_pause_;
 };
 
+  std::atomic<bool> yields_{false};
 }  // namespace plchost::modbus
