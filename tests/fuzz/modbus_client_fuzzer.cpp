@@ -54,6 +54,16 @@ void take(const RegisterMap& map, std::span<const std::uint8_t> response) {
   if (!taken && taken.error().text.empty()) std::abort();
 }
 
+// From the first frame on that has the number of the request. The ones of others are passed over.
+std::span<const std::uint8_t> from_answer(std::span<const std::uint8_t> sent) {
+  constexpr std::size_t kUncounted = 6;
+  while (sent.size() >= kHeader && (sent[0] != kNumber >> 8U || sent[1] != (kNumber & 0xffU))) {
+    const std::size_t length = kUncounted + (static_cast<std::size_t>(sent[4]) << 8U | sent[5]);
+    sent = sent.subspan(std::min(length, sent.size()));
+  }
+  return sent;
+}
+
 // The device has ended the connection behind its bytes.
 void exchange(const Pdu& request, std::span<const std::uint8_t> sent) {
   std::array<int, 2> sockets{};
@@ -66,12 +76,12 @@ void exchange(const Pdu& request, std::span<const std::uint8_t> sent) {
   const ssize_t size = ::recv(sockets[1], asked.data(), asked.size(), MSG_DONTWAIT);
   if (size != static_cast<ssize_t>(kHeader + request.size)) std::abort();
   if (response) {
-    const auto behind = sent.subspan(kHeader);
+    const auto frame = from_answer(sent);
+    if (frame.size() < kHeader) std::abort();
+    const auto behind = frame.subspan(kHeader);
     if (response->size == 0 || response->size > kMaxPdu || response->size > behind.size()) std::abort();
     if (!std::ranges::equal(response->view(), behind.first(response->size))) std::abort();
-    if (sent[0] != kNumber >> 8U || sent[1] != (kNumber & 0xffU) || sent[2] != 0 || sent[3] != 0 ||
-        sent[6] != kUnit)
-      std::abort();
+    if (frame[2] != 0 || frame[3] != 0 || frame[6] != kUnit) std::abort();
   } else if (response.error().text.empty()) {
     std::abort();
   }

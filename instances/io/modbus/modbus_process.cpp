@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 
+#include "instances/io/modbus/config/endpoint.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
@@ -21,10 +22,17 @@ using std::chrono::milliseconds;
 constexpr milliseconds kShow{50};          // how fine the ages are
 constexpr milliseconds kRepairPause{500};  // images whose file was removed
 // At first a device that answers puts its outputs into their safe state; a thread on TCP that still waits
-// then is interrupted. The devices of a serial line take turns, which cannot be.
+// then is interrupted. The devices of a serial line or of one connection take turns, which cannot be.
 constexpr milliseconds kSafeStateTime{600};
 constexpr milliseconds kInterruptTime{250};
 constexpr milliseconds kLineTime{10'000};
+
+// Devices with the same one take turns.
+std::string line_of(const DeviceConfig& device) {
+  if (!device.serial.empty()) return device.serial;
+  const auto endpoint = parse_endpoint(device.tcp);
+  return device.share_connection && endpoint ? endpoint->text() : "tcp " + device.name;
+}
 
 }  // namespace
 
@@ -45,16 +53,16 @@ ModbusProcess::~ModbusProcess() {
 
 Result<void> ModbusProcess::add_devices() {
   for (const DeviceConfig& device : config_.devices) {
-    auto& line = lines_[device.serial.empty() ? "tcp " + device.name : device.serial];
+    auto& line = lines_[line_of(device)];
     if (!line) {
       PLCHOST_TRY_ASSIGN(line, Link::make(device, stop_));
       PLCHOST_TRY(line->claim(device));
     }
+    devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
     if (!device.tcp.empty() && !device.writes.empty()) {
       PLCHOST_TRY_ASSIGN(auto claim, OutputsClaim::take(config_.process.pool, device));
       outputs_.push_back({.claim = std::move(claim), .device = devices_.back().get()});
     }
-    devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
   }
   return {};
 }
@@ -103,7 +111,9 @@ bool ModbusProcess::stop() {
     ended = join_until(now + kSafeStateTime + kInterruptTime);
   }
   const auto at_line = [](const DeviceConfig& device) { return !device.serial.empty(); };
-  if (!ended && std::ranges::any_of(config_.devices, at_line)) {
+  const bool take_turns =
+      std::ranges::any_of(config_.devices, at_line) || lines_.size() < config_.devices.size();
+  if (!ended && take_turns) {
     show(MonotonicClock::now(), true);
     ended = join_until(now + kLineTime);
   }

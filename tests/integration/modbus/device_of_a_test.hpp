@@ -42,6 +42,35 @@ image = "t.out"
                      port.address(), more);
 }
 
+// A device with an input register at byte `offset`, two output registers from `unit` on, and its status 40
+// bytes behind.
+inline std::string serial_device(const SerialLine& line, int unit, int offset) {
+  return fmt::format(R"(
+[[device]]
+name = "unit{1}"
+serial = "{0}"
+parity = "none"
+unit = {1}
+poll_ms = 20
+timeout_ms = 200
+reconnect_ms = 100
+reconnect_max_ms = 2000
+status_image = "t.in"
+status_offset = {3}
+[[device.read]]
+kind = "input_register"
+address = 100
+image = "t.in"
+offset = {2}
+[[device.write]]
+kind = "holding_register"
+address = {1}
+count = 2
+image = "t.out"
+)",
+                     line.path(), unit, offset, 40 + offset);
+}
+
 // A PLC that puts this word out again and again, until the register that device() writes has it.
 inline bool follows(Plant& plant, ModbusPeer& peer, std::uint16_t word) {
   return eventually([&] {

@@ -22,33 +22,6 @@ namespace {
 
 using modbus::Quality;
 
-std::string serial_device(const SerialLine& line, int unit, int offset) {
-  return fmt::format(R"(
-[[device]]
-name = "unit{1}"
-serial = "{0}"
-parity = "none"
-unit = {1}
-poll_ms = 20
-timeout_ms = 200
-reconnect_ms = 100
-reconnect_max_ms = 2000
-status_image = "t.in"
-status_offset = {3}
-[[device.read]]
-kind = "input_register"
-address = 100
-image = "t.in"
-offset = {2}
-[[device.write]]
-kind = "holding_register"
-address = {1}
-count = 2
-image = "t.out"
-)",
-                     line.path(), unit, offset, 40 + offset);
-}
-
 TEST(ModbusLine, ExchangesWithADeviceAtASerialLine) {
   Plant plant;
   const SerialLine line;

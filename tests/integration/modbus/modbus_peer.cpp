@@ -161,6 +161,16 @@ bool ModbusPeer::answer_altered(int fd, Request& request, std::size_t at, std::u
   return ::send(fd, request.data(), size, MSG_NOSIGNAL) > 0;
 }
 
+bool ModbusPeer::refuses(const Request& request) const {
+  const int function = request[7];
+  const bool is_single =
+      function == MODBUS_FC_WRITE_SINGLE_COIL || function == MODBUS_FC_WRITE_SINGLE_REGISTER;
+  const bool is_several =
+      function == MODBUS_FC_WRITE_MULTIPLE_COILS || function == MODBUS_FC_WRITE_MULTIPLE_REGISTERS;
+  if (mode_ == Mode::no_single) return is_single;
+  return mode_ == Mode::no_several ? is_several : (request[8] << 8U | request[9]) >= kHalf;
+}
+
 bool ModbusPeer::answer(int fd, Request& request, int size) {
   ++requests_;
   static constexpr std::array<char, 300> kGarbage{'g', 'a', 'r'};
@@ -183,6 +193,20 @@ bool ModbusPeer::answer(int fd, Request& request, int size) {
       return true;
     case Mode::refuses:
       return modbus_reply_exception(context_, request.data(), MODBUS_EXCEPTION_ILLEGAL_DATA_ADDRESS) > 0;
+    case Mode::unreachable:
+      return modbus_reply_exception(context_, request.data(), MODBUS_EXCEPTION_GATEWAY_TARGET) > 0;
+    case Mode::no_single:
+    case Mode::no_several:
+    case Mode::half:
+      if (refuses(request)) {
+        return modbus_reply_exception(context_, request.data(), MODBUS_EXCEPTION_ILLEGAL_FUNCTION) > 0;
+      }
+      break;
+    case Mode::answers_another:
+      --request[1];
+      if (modbus_reply(context_, request.data(), size, mapping_) < 0) return false;
+      ++request[1];
+      break;
     case Mode::other_unit:
       ++request[6];
       break;

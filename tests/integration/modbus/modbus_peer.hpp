@@ -47,23 +47,29 @@ class SerialLine {
 class ModbusPeer {
  public:
   static constexpr int kRegisters = 300;
+  static constexpr int kHalf = 200;
   static constexpr std::uint8_t kOwnException = 0x21;
   static constexpr std::chrono::milliseconds kSlow{30};
   enum class Mode : int {
     normal,
-    stalls,          ///< takes requests, and does not answer
-    garbage,         ///< answers with bytes that are no Modbus
-    dribbles,        ///< answers one byte of a response after the other, and never ends
-    refuses,         ///< answers with exception 2
-    other_unit,      ///< answers as another unit
-    other_length,    ///< says more bytes in the header than the function has
-    other_protocol,  ///< says in the header that it is no Modbus
-    other_write,     ///< confirms writes of another address
-    own_exception,   ///< answers with an exception that no standard names
-    slow,            ///< normal, kSlow behind each request
-    late,            ///< answers each request with the response to an earlier one: answer_late()
-    ends,            ///< normal, and ends the connection behind each response
-    echoes,          ///< normal, and its input registers follow its holding registers
+    stalls,           ///< takes requests, and does not answer
+    garbage,          ///< answers with bytes that are no Modbus
+    dribbles,         ///< answers one byte of a response after the other, and never ends
+    refuses,          ///< answers with exception 2
+    other_unit,       ///< answers as another unit
+    other_length,     ///< says more bytes in the header than the function has
+    other_protocol,   ///< says in the header that it is no Modbus
+    other_write,      ///< confirms writes of another address
+    unreachable,      ///< answers as a gateway that does not reach the device: with exception 11
+    no_single,        ///< has no functions that write one register or coil
+    no_several,       ///< has no functions that write several
+    half,             ///< refuses what lies from register kHalf on
+    answers_another,  ///< normal, behind a response to the request before
+    own_exception,    ///< answers with an exception that no standard names
+    slow,             ///< normal, kSlow behind each request
+    late,             ///< answers each request with the response to an earlier one: answer_late()
+    ends,             ///< normal, and ends the connection behind each response
+    echoes,           ///< normal, and its input registers follow its holding registers
   };
 
   /// On TCP.
@@ -95,6 +101,8 @@ class ModbusPeer {
   [[nodiscard]] bool serve(int fd);
   [[nodiscard]] bool answer(int fd, Request& request, int size);
   [[nodiscard]] static bool answer_altered(int fd, Request& request, std::size_t at, std::uint8_t byte);
+  /// On TCP.
+  [[nodiscard]] bool refuses(const Request& request) const;
   void make_mapping();
 
   modbus_t* context_ = nullptr;

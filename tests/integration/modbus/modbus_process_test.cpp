@@ -9,6 +9,7 @@
 #include <iterator>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -177,7 +178,6 @@ TEST(ModbusProcess, TheOutputsOfADeviceHaveOneProcess) {
   EXPECT_TRUE(follows(plant, peer, 97)) << third.log();
 }
 
-// The end of a host removes the files of its pool.
 // The files of claims in the pool of the plant.
 std::vector<std::filesystem::path> claims(const Plant& plant) {
   std::vector<std::filesystem::path> found;
@@ -221,6 +221,7 @@ TEST(ModbusProcess, AProcessWhoseClaimAnotherOneHasWritesNoOutputs) {
   EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
 }
 
+// The end of a host removes the files of its pool.
 TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsRemoved) {
   Plant plant;
   const HeldPort port;

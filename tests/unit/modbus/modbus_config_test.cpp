@@ -41,6 +41,7 @@ baud = 9600
 parity = "none"
 stop_bits = 2
 unit = 17
+probe = false
 poll_ms = 20
 timeout_ms = 100
 reconnect_ms = 200
@@ -58,6 +59,7 @@ count = 4
 image = "t.in"
 offset = 8
 order = "cdab"
+optional = true
 [[device.write]]
 kind = "coil"
 address = 3
@@ -65,6 +67,7 @@ count = 5
 image = "t.out"
 offset = 2
 bit = 7
+function = "single"
 rewrite_ms = 0
 [server]
 listen = "[::1]:1502"
@@ -85,6 +88,7 @@ writable = true
   EXPECT_EQ(device.parity, Parity::none);
   EXPECT_EQ(device.stop_bits, 2);
   EXPECT_EQ(device.unit, 17);
+  EXPECT_FALSE(device.probe);
   EXPECT_EQ(device.poll, 20ms);
   EXPECT_EQ(device.timeout, 100ms);
   EXPECT_EQ(device.reconnect, 200ms);
@@ -100,8 +104,10 @@ writable = true
   EXPECT_EQ(device.reads[0].count, 4);
   EXPECT_EQ(device.reads[0].offset, 8);
   EXPECT_EQ(device.reads[0].order, RegisterOrder::cdab);
+  EXPECT_TRUE(device.reads[0].optional);
   ASSERT_THAT(device.writes, SizeIs(1));
   EXPECT_EQ(device.writes[0].bit, 7);
+  EXPECT_EQ(device.writes[0].function, WriteFunction::single);
   EXPECT_EQ(device.writes[0].rewrite, 0ms);
   ASSERT_TRUE(config->server.has_value());
   ASSERT_THAT(config->server->maps, SizeIs(1));
@@ -205,6 +211,23 @@ TEST(ModbusConfig, TheDevicesOfOneLineHaveOneSpeed) {
   };
   EXPECT_EQ(refused(device(1, 9600, 0) + device(2, 9600, 1)), "accepted");
   EXPECT_THAT(refused(device(1, 9600, 0) + device(2, 19200, 1)), HasSubstr("has another baud"));
+}
+
+// 125 registers of 11 bits for each byte at 4800 baud: 585 ms.
+TEST(ModbusConfig, AResponseThatTakesLongerThanItsLimitIsRefused) {
+  const auto device = [](int baud, int timeout, int count) {
+    return fmt::format(
+        "[[image]]\nname = \"big.in\"\ndirection = \"input\"\nsize = 1000\n"
+        "[[device]]\nname = \"d\"\nserial = \"/dev/ttyS9\"\nbaud = {}\ntimeout_ms = {}\n"
+        "[[device.read]]\nkind = \"input_register\"\naddress = 0\nimage = \"big.in\"\ncount = {}\n",
+        baud, timeout, count);
+  };
+  EXPECT_THAT(refused(device(4800, 500, 125)),
+              HasSubstr("m.toml:17:1: [[device]] 'd' timeout_ms: the response of the map in line 18 alone "
+                        "takes 585 ms at 4800 baud"));
+  EXPECT_EQ(refused(device(4800, 600, 125)), "accepted");
+  EXPECT_EQ(refused(device(4800, 500, 100)), "accepted");
+  EXPECT_EQ(refused(device(9600, 500, 125)), "accepted");
 }
 
 TEST(ModbusConfig, HasBounds) {

@@ -49,6 +49,36 @@ TEST(ModbusPdu, EachTableHasItsFunction) {
             (Bytes{16, 0, 7, 0, 2, 4, 0xff, 0xfe, 0, 1}));
 }
 
+TEST(ModbusPdu, TheFunctionOfAWriteCanBeChosen) {
+  RegisterMap map = map_of(RegisterKind::holding_register, 7, 1);
+  EXPECT_TRUE(is_one_write(map));
+  map.function = WriteFunction::several;
+  EXPECT_TRUE(is_one_write(map));
+  EXPECT_EQ(written(map, {0x1234}), (Bytes{16, 0, 7, 0, 1, 2, 0x12, 0x34}));
+  EXPECT_EQ(write_shape(map).function, 16);
+  map.kind = RegisterKind::coil;
+  EXPECT_EQ(written(map, {1}), (Bytes{15, 0, 7, 0, 1, 1, 1}));
+  map.function = WriteFunction::single;
+  EXPECT_EQ(written(map, {1}), (Bytes{5, 0, 7, 0xff, 0}));
+  EXPECT_TRUE(is_one_write(map));
+  map.count = 2;
+  EXPECT_FALSE(is_one_write(map));
+  EXPECT_EQ(write_shape(map).function, 5);
+  map.function = WriteFunction::automatic;
+  EXPECT_TRUE(is_one_write(map));
+}
+
+// Those of a gateway say that the device is not there.
+TEST(ModbusPdu, ARefusalIsAnExceptionOfTheDeviceItself) {
+  MapValues values;
+  const RegisterMap map = map_of(RegisterKind::input_register, 0, 1);
+  for (int code = 1; code <= 255; ++code) {
+    const auto taken = take_values(map, Bytes{0x84, static_cast<std::uint8_t>(code)}, values);
+    EXPECT_EQ(taken.error().is_refusal(), code != 10 && code != 11) << code;
+  }
+  EXPECT_FALSE(take_values(map, Bytes{}, values).error().is_refusal());
+}
+
 TEST(ModbusPdu, TheLongestRequestsFit) {
   MapValues values;
   EXPECT_EQ(write_request(map_of(RegisterKind::coil, 0, kMaxWriteBits), values).size, 6 + 246);

@@ -31,7 +31,7 @@ Device::Device(const DeviceConfig& config, Link& link, const ImageTable& images,
   for (const RegisterMap& map : config.writes) {
     outputs_.push_back({.map = &map, .image = images.output(map.image), .written = {}, .written_at = {}});
   }
-  if (!config.serial.empty()) unanswered_ = Unanswered::of_process_before();
+  if (!config.serial.empty() && config.probe) unanswered_ = Unanswered::of_process_before();
 }
 
 void Device::run() {
@@ -61,7 +61,7 @@ bool Device::poll() {
   asked_ = !inputs_.empty();
   const LinkResult written = write_outputs();
   if (!asked_) return false;  // nothing was due, so nothing is known
-  const bool is_there = written || written.error().exception != 0;
+  const bool is_there = written || written.error().is_refusal();
   TimePoint asked_at = MonotonicClock::now();
   const LinkResult read = is_there ? read_inputs(asked_at) : written;
   end_poll(written, read, asked_at);
@@ -75,7 +75,7 @@ LinkResult Device::write_outputs() {
     const LinkResult written = write_output(output);
     if (written) continue;
     result = written;
-    if (written.error().exception == 0) break;
+    if (!written.error().is_refusal()) break;
   }
   return result;
 }
@@ -93,16 +93,17 @@ LinkResult Device::write_output(Output& output) {
   // While the others of a serial line have their turns, or a connection is made, the PLC may have stopped.
   const Link::Turn turn = link_.take_turn();
   LinkResult result;
-  // A connection at rest may end while it is written to. Then the next one is made, with the values of then.
+  // A connection at rest may end while it is written to, and a response be garbled. The values are then those
+  // of the second attempt.
   for (bool again = true;; again = false) {
     result = link_.open(config_);
     values = MapValues();
     if (result && !is_due(output, values)) return {};
     if (result) result = link_.write(config_, *output.map, values);
-    if (result || !again || !result.error().at_rest) break;
+    note(write_shape(*output.map), result);
+    if (result || !again || !(result.error().at_rest || is_noise(result.error()))) break;
   }
   asked_ = true;
-  note(write_shape(*output.map), result);
   output.is_written = result.has_value();
   output.connection = link_.connection();
   output.written = values;
@@ -140,12 +141,31 @@ LinkResult Device::read_inputs(TimePoint& asked_at) {
   for (Input& input : inputs_) {
     const Link::Turn turn = link_.take_turn();
     if (&input == &inputs_.front()) asked_at = MonotonicClock::now();
-    if (auto apart = tell_apart(*input.map); !apart) return apart;
-    auto read = link_.read(config_, *input.map, input.values);
-    note(read_shape(*input.map), read);
-    if (!read) return read;
+    if (auto read = read_input(input); !read) return read;
   }
   return {};
+}
+
+LinkResult Device::read_input(Input& input) {
+  for (bool again = true;; again = false) {
+    LinkResult read = tell_apart(*input.map);
+    if (read) read = read_map(input);
+    if (read || !again || !is_noise(read.error())) return read;
+  }
+}
+
+LinkResult Device::read_map(Input& input) {
+  auto read = link_.read(config_, *input.map, input.values);
+  note(read_shape(*input.map), read);
+  input.refused = 0;
+  if (read || !input.map->optional || !read.error().is_refusal()) return read;
+  input.refused = read.error().exception;
+  return {};
+}
+
+// It is no reason to give a device up. One that sends nothing else would cost the others twice the time.
+bool Device::is_noise(const LinkFailure& failure) const noexcept {
+  return failure.is_garbled && quality_ != Quality::lost;
 }
 
 // A device that answers one request too late would do so forever, with the values of other registers. So
@@ -159,16 +179,16 @@ LinkResult Device::tell_apart(const RegisterMap& map) {
     note(read_shape(*other), read);
     if (read) continue;
     // Also if it was refused: a device that refuses all would be asked again and again, and others wait.
-    read.error().text +=
-        fmt::format(", when it was asked for {} from address {} to tell late responses apart", other->count,
-                    other->address);
+    read.error().text += fmt::format(
+        ", when it was asked for {} from address {} to tell late responses apart{}", other->count,
+        other->address, read.error().exception == 0 ? "; if it never answers that, set probe = false" : "");
     return read;
   }
   return {};
 }
 
 void Device::note(ResponseShape shape, const LinkResult& result) {
-  if (config_.serial.empty()) return;
+  if (config_.serial.empty() || !config_.probe) return;
   if (result) {
     unanswered_.answered(shape);
   } else if (result.error().exception != 0) {
@@ -189,9 +209,9 @@ void Device::publish_inputs(TimePoint now) {
     image->update([&](std::span<std::byte> bytes) {
       for (Input& input : inputs_) {
         if (input.image != image) continue;
-        if (gone) {
+        if (gone || (input.refused != 0 && config_.when_gone == LossPolicy::zero)) {
           put_zeros(*input.map, bytes);
-        } else {
+        } else if (input.refused == 0) {
           input.values.write_to(*input.map, bytes);
         }
       }
@@ -202,8 +222,11 @@ void Device::publish_inputs(TimePoint now) {
 void Device::end_poll(const LinkResult& written, const LinkResult& read, TimePoint asked_at) {
   const LinkFailure* const failure = !read ? &read.error() : !written ? &written.error() : nullptr;
   if (failure != nullptr && failure->not_asked) return;
-  const std::uint8_t exception = failure == nullptr ? std::uint8_t{0} : failure->exception;
-  quality_ = failure == nullptr ? Quality::good : exception != 0 ? Quality::exception : Quality::lost;
+  const auto refused = std::ranges::find_if(inputs_, [](const Input& input) { return input.refused != 0; });
+  const std::uint8_t exception = failure != nullptr         ? failure->exception
+                                 : refused != inputs_.end() ? refused->refused
+                                                            : std::uint8_t{0};
+  quality_ = failure == nullptr ? Quality::good : failure->is_refusal() ? Quality::exception : Quality::lost;
   if (quality_ == Quality::lost) {
     for (Output& output : outputs_) output.is_written = false;
   }
@@ -220,20 +243,38 @@ void Device::end_poll(const LinkResult& written, const LinkResult& read, TimePoi
 
 // Once for each change, and at most once a second.
 void Device::report(const LinkFailure* failure) {
-  if (quality_ == told_ || !log_pause_.is_over(MonotonicClock::now())) return;
+  if (quality_ == told_) return report_refused();
+  if (!log_pause_.is_over(MonotonicClock::now())) return;
   told_ = quality_;
   if (failure == nullptr) {
     spdlog::info("device '{}' answers", config_.name);
-  } else if (failure->exception != 0) {
+  } else if (failure->is_refusal()) {
     spdlog::warn("device '{}' refuses a request with exception {}: {}", config_.name, failure->exception,
                  failure->text);
+  } else if (failure->exception != 0) {
+    spdlog::warn("device '{}' is lost: its gateway answers with exception {}: {}", config_.name,
+                 failure->exception, failure->text);
   } else {
     spdlog::warn("device '{}' is lost: {}", config_.name, failure->text);
   }
 }
 
+void Device::report_refused() {
+  for (Input& input : inputs_) {
+    if (input.refused == input.told || !log_pause_.is_over(MonotonicClock::now())) continue;
+    input.told = input.refused;
+    if (input.refused == 0) {
+      spdlog::info("device '{}' answers from address {}", config_.name, input.map->address);
+    } else {
+      spdlog::warn("device '{}' refuses the optional map from address {} with exception {}", config_.name,
+                   input.map->address, input.refused);
+    }
+  }
+}
+
 // A device that refuses one map, or that did not answer last, may take the others.
 void Device::make_safe() {
+  if (yields_) return;
   const bool untouched = quality_ == Quality::none && std::ranges::none_of(outputs_, &Output::is_written);
   if (config_.when_silent != LossPolicy::zero || untouched) return;
   const Duration limit = quality_ == Quality::lost ? kLastAttempt : kSafeStateTimeout;
@@ -241,12 +282,14 @@ void Device::make_safe() {
   for (const Output& output : outputs_) {
     MapValues zeros;
     const Duration timeout = std::min(config_.timeout, limit);
-    const LinkResult written = is_there ? link_.write_at_end(config_, *output.map, zeros, timeout)
-                                        : std::unexpected(LinkFailure{.text = "it does not answer"});
+    LinkResult written = std::unexpected(LinkFailure{.text = "it does not answer"});
+    if (is_there) written = link_.write_at_end(config_, *output.map, zeros, timeout);
+    if (!written && is_noise(written.error()))
+      written = link_.write_at_end(config_, *output.map, zeros, timeout);
     if (written) continue;
     spdlog::warn("device '{}': its outputs from address {} were not set to zero: {}", config_.name,
                  output.map->address, written.error().text);
-    is_there = written.error().exception != 0;
+    is_there = written.error().is_refusal();
   }
 }
 
@@ -262,4 +305,3 @@ void Device::show(const InputImage& image, std::span<std::byte> bytes, TimePoint
 }
 
 }  // namespace plchost::modbus
-  if (yields_) return;

@@ -22,7 +22,7 @@
 namespace plchost::modbus {
 
 /// One device: writes the outputs of a PLC to it, and its inputs into images. A poll puts all inputs into the
-/// images, or none.
+/// images, or none; those that are optional and refused are left out.
 class Device {
  public:
   /// The images are those of the configuration.
@@ -52,6 +52,8 @@ class Device {
     const RegisterMap* map;
     InputImage* image;
     MapValues values;
+    std::uint8_t refused = 0;  ///< of an optional map: the exception of its last request
+    std::uint8_t told = 0;     ///< of them, in the log
   };
   struct Output {
     const RegisterMap* map;
@@ -69,6 +71,9 @@ class Device {
   [[nodiscard]] bool outputs_of(Output& output, MapValues& values);
   void tell_silence(Output& output, bool silent) const;
   [[nodiscard]] LinkResult read_inputs(TimePoint& asked_at);
+  [[nodiscard]] LinkResult read_input(Input& input);
+  [[nodiscard]] LinkResult read_map(Input& input);
+  [[nodiscard]] bool is_noise(const LinkFailure& failure) const noexcept;
   [[nodiscard]] LinkResult tell_apart(const RegisterMap& map);
   void note(ResponseShape shape, const LinkResult& result);
   [[nodiscard]] bool is_gone(TimePoint now) const;
@@ -76,6 +81,7 @@ class Device {
   void make_safe();
   void end_poll(const LinkResult& written, const LinkResult& read, TimePoint asked_at);
   void report(const LinkFailure* failure);
+  void report_refused();
 
   const DeviceConfig& config_;
   Link& link_;
@@ -87,11 +93,11 @@ class Device {
   DeviceState state_;
   Unanswered unanswered_;  ///< at a serial line
   std::atomic<bool> has_ended_{false};
+  std::atomic<bool> yields_{false};
   bool asked_ = false;               ///< the poll has something to ask
   Quality quality_ = Quality::none;  ///< of the last poll
   Quality told_ = Quality::none;     ///< in the log
   LogPause log_pause_;
 };
 
-  std::atomic<bool> yields_{false};
 }  // namespace plchost::modbus

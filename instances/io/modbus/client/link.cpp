@@ -10,6 +10,7 @@
 #include <poll.h>
 #include <sys/select.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include "instances/io/modbus/client/device_claim.hpp"
 #include "instances/io/modbus/client/tcp_connect.hpp"
@@ -33,7 +34,20 @@ std::unexpected<LinkFailure> without_answer(std::string text) {
 constexpr int kDataBits = 8;  // of RTU
 // A device that answers does so within that time. At the end one that does not must not keep the line.
 constexpr std::chrono::milliseconds kGraceAtEnd{300};
+constexpr int kAround = 3;  // unit and checksum, which libmodbus compares
+constexpr std::int64_t kCharacterBits = 11;
 constexpr std::array kParityLetters = {'N', 'E', 'O'};
+
+Duration time_of(std::int64_t half_characters, int baud) {
+  return std::chrono::nanoseconds(std::chrono::seconds(half_characters * kCharacterBits)) / (2 * baud);
+}
+
+// Frames on a line are told apart by a silence of 3.5 characters, which is not below 1.75 ms.
+Duration silence_of(int baud) {
+  constexpr std::int64_t kHalfCharacters = 7;
+  constexpr std::chrono::microseconds kLeast{1750};
+  return std::max<Duration>(time_of(kHalfCharacters, baud), kLeast);
+}
 
 }  // namespace
 
@@ -148,36 +162,65 @@ bool Link::await_line(TimePoint deadline, Limits limits) {
   return true;
 }
 
-std::expected<Pdu, LinkFailure> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
-  if (auto opened = open_line(device); !opened) {
-    auto failure = without_answer(std::move(opened).error());
-    failure.error().not_sent = true;
-    return failure;
+// Bytes that come meanwhile are a late response, or noise: the silence begins behind them.
+void Link::await_silence(const DeviceConfig& device) {
+  const int fd = modbus_get_socket(line_.get());
+  const TimePoint give_up = MonotonicClock::now() + device.timeout;
+  std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> ignored{};
+  while (MonotonicClock::now() < give_up &&
+         wait_for(fd, POLLIN, last_byte_ + silence_of(device.baud), nullptr) &&
+         ::read(fd, ignored.data(), ignored.size()) > 0) {
+    last_byte_ = MonotonicClock::now();
   }
+}
+
+std::expected<Pdu, LinkFailure> Link::ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked) {
+  if (auto opened = open_line(device); !opened)
+    return std::unexpected(LinkFailure{.text = std::move(opened).error(), .not_sent = true});
   modbus_t* const line = line_.get();
   modbus_set_slave(line, device.unit);
-  modbus_flush(line);  // a late response of somebody else
+  await_silence(device);
   std::array<std::uint8_t, kMaxPdu + 1> raw{};
   raw[0] = device.unit;
   std::ranges::copy(asked.view(), raw.begin() + 1);
-  std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> received{};
   const bool sent = modbus_send_raw_request(line, raw.data(), static_cast<int>(asked.size) + 1) > 0;
-  const TimePoint deadline = MonotonicClock::now() + limits.timeout;
-  const int size =
-      sent && await_line(deadline, limits) ? modbus_receive_confirmation(line, received.data()) : -1;
-  if (size < 0) {
-    // The line stays open for its other devices while they can use it.
-    const int error = errno;
-    if (error != ETIMEDOUT && error <= MODBUS_ENOBASE) close_line();
-    return without_answer(modbus_strerror(error));
-  }
-  constexpr int kAround = 3;  // unit and checksum, which libmodbus has compared
-  if (size <= kAround || received[0] != device.unit)
-    return without_answer(fmt::format("the response is not of unit {}", device.unit));
-  Pdu response;
-  response.size = static_cast<std::size_t>(size - kAround);
-  std::copy_n(received.begin() + 1, response.size, response.bytes.begin());
+  const int error = errno;
+  const auto bytes = static_cast<std::int64_t>(asked.size) + kAround;
+  last_byte_ = MonotonicClock::now() + time_of(2 * bytes, device.baud);  // the kernel still sends it
+  auto response =
+      sent ? receive_line(device, last_byte_ + limits.timeout, limits) : line_failure(error, false);
+  const TimePoint now = MonotonicClock::now();
+  last_byte_ = response ? now : std::max(last_byte_, now);
   return response;
+}
+
+// The line stays open for its other devices while they can use it.
+std::unexpected<LinkFailure> Link::line_failure(int error, bool has_begun) {
+  const bool is_garbled = error > MODBUS_ENOBASE || (error == ETIMEDOUT && has_begun);
+  if (error != ETIMEDOUT && !is_garbled) close_line();
+  return std::unexpected(LinkFailure{.text = modbus_strerror(error), .is_garbled = is_garbled});
+}
+
+// A late response of another unit is none of this one, which may still answer.
+std::expected<Pdu, LinkFailure> Link::receive_line(const DeviceConfig& device, TimePoint deadline,
+                                                   Limits limits) {
+  std::array<std::uint8_t, MODBUS_RTU_MAX_ADU_LENGTH> received{};
+  bool is_of_another = false;
+  while (await_line(deadline, limits)) {
+    const int size = modbus_receive_confirmation(line_.get(), received.data());
+    if (size < 0) return line_failure(errno, true);
+    if (size > kAround && received[0] == device.unit) {
+      Pdu response;
+      response.size = static_cast<std::size_t>(size - kAround);
+      std::copy_n(received.begin() + 1, response.size, response.bytes.begin());
+      return response;
+    }
+    is_of_another = true;
+    if (MonotonicClock::now() >= deadline) break;
+  }
+  if (!is_of_another) return line_failure(ETIMEDOUT, false);
+  return std::unexpected(
+      LinkFailure{.text = fmt::format("the response is not of unit {}", device.unit), .is_garbled = true});
 }
 
 LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take) {
@@ -193,7 +236,7 @@ LinkResult Link::open(const DeviceConfig& device) {
   const Turn turn = take_turn();
   if (stop_.is_set()) return std::unexpected(not_asked());
   auto opened = line_ ? open_line(device) : open_tcp(device, {.timeout = device.timeout});
-  if (!opened) return without_answer(std::move(opened).error());
+  if (!opened) return std::unexpected(LinkFailure{.text = std::move(opened).error(), .not_sent = true});
   return {};
 }
 
@@ -212,6 +255,24 @@ LinkResult Link::write_at_end(const DeviceConfig& device, const RegisterMap& map
 }
 
 LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits) {
+  if (is_one_write(map)) return write_once(device, map, values, limits);
+  RegisterMap one = map;
+  one.count = 1;
+  for (std::uint32_t i = 0; i < map.count; ++i) {
+    MapValues value;
+    if (is_bit(map.kind)) {
+      value.bits(1)[0] = values.bits(map.count)[i];
+    } else {
+      value.registers(1)[0] = values.registers(map.count)[i];
+    }
+    if (auto written = write_once(device, one, value, limits); !written) return written;
+    ++one.address;
+  }
+  return {};
+}
+
+LinkResult Link::write_once(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
+                            Limits limits) {
   const Pdu asked = write_request(map, values);
   return request(device, limits, asked,
                  [&](std::span<const std::uint8_t> response) { return check_written(asked, response); });

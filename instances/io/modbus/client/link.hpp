@@ -15,14 +15,16 @@
 #include "instances/io/modbus/config/map_values.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 #include "instances/io/modbus/threads/stop_event.hpp"
+#include "instances/io/modbus/threads/turn_lock.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost::modbus {
 
-/// The way to one device on TCP, or to all devices of one serial line, which take turns for each request. It
-/// connects by itself. A TCP connection is closed after each failure that is no exception, so that no late
-/// response is taken for another one's. Any thread.
+/// The way to one device on TCP, or to all devices of one serial line or one connection, which take turns for
+/// each request. It connects by itself. A TCP connection is closed after each failure that is no exception,
+/// so that no late response is taken for another one's. Any thread.
 class Link {
  public:
   /// The address or the line is that of the device. Nothing is opened yet. Set-up.
@@ -34,9 +36,9 @@ class Link {
   /// Takes a serial line for this process, if it is there. busy: another process has it. Set-up.
   [[nodiscard]] Result<void> claim(const DeviceConfig& device);
 
-  /// The line is this thread's alone, until the end of what is returned: for several requests, or for values
-  /// that must not grow old while others have their turn.
-  using Turn = std::unique_lock<std::recursive_mutex>;
+  /// The line or connection is this thread's alone, until the end of what is returned. That is for several
+  /// requests, or for values that must not grow old while others have their turn.
+  using Turn = std::unique_lock<TurnLock>;
   [[nodiscard]] Turn take_turn() { return Turn(turn_); }
 
   /// Connects, or opens the line, if that is not done: a request then waits for nothing before it is sent.
@@ -72,7 +74,11 @@ class Link {
   LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
   std::expected<Pdu, LinkFailure> ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked);
   bool await_line(TimePoint deadline, Limits limits);
+  LinkResult write_once(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
+  void await_silence(const DeviceConfig& device);
   std::expected<Pdu, LinkFailure> ask_line(const DeviceConfig& device, Limits limits, const Pdu& asked);
+  std::unexpected<LinkFailure> line_failure(int error, bool has_begun);
+  std::expected<Pdu, LinkFailure> receive_line(const DeviceConfig& device, TimePoint deadline, Limits limits);
   std::expected<void, std::string> open_tcp(const DeviceConfig& device, Limits limits);
   std::expected<void, std::string> open_line(const DeviceConfig& device);
   void close_line() noexcept;
@@ -80,8 +86,9 @@ class Link {
 
   std::unique_ptr<modbus_t, Free> line_;  ///< null: TCP
   const StopEvent& stop_;
-  std::recursive_mutex turn_;  ///< held for one request, and for what follows
+  TurnLock turn_;  ///< held for one request, and for what follows
   bool line_is_open_ = false;
+  TimePoint last_byte_;       ///< at the line, as far as it is known
   UniqueFd claim_;            ///< of the line; a name whose device is gone would stay with it
   std::uint16_t number_ = 0;  ///< of the last request on TCP
   std::atomic<std::uint64_t> connection_{0};

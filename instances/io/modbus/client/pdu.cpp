@@ -51,8 +51,13 @@ std::uint8_t read_function(const RegisterMap& map) noexcept {
   return static_cast<std::uint8_t>(kReadFunctions.at(std::to_underlying(map.kind)));
 }
 
+bool is_single_write(const RegisterMap& map) noexcept {
+  return map.function == WriteFunction::single ||
+         (map.function == WriteFunction::automatic && map.count == 1);
+}
+
 std::uint8_t write_function(const RegisterMap& map) noexcept {
-  const bool single = map.count == 1;
+  const bool single = is_single_write(map);
   if (is_bit(map.kind)) return single ? MODBUS_FC_WRITE_SINGLE_COIL : MODBUS_FC_WRITE_MULTIPLE_COILS;
   return single ? MODBUS_FC_WRITE_SINGLE_REGISTER : MODBUS_FC_WRITE_MULTIPLE_REGISTERS;
 }
@@ -93,14 +98,17 @@ Pdu read_request(const RegisterMap& map) noexcept {
   return pdu;
 }
 
+bool is_one_write(const RegisterMap& map) noexcept {
+  return map.count == 1 || !is_single_write(map);
+}
+
 Pdu write_request(const RegisterMap& map, MapValues& values) noexcept {
   constexpr unsigned kOn = 0xff00;
-  const bool single = map.count == 1;
   const bool bits = is_bit(map.kind);
   Pdu pdu;
   add_byte(pdu, write_function(map));
   add_word(pdu, map.address);
-  if (single) {
+  if (is_single_write(map)) {
     add_word(pdu, bits ? (values.bits(1)[0] != 0 ? kOn : 0) : values.registers(1)[0]);
     return pdu;
   }

@@ -7,6 +7,8 @@
 #include <span>
 #include <string>
 
+#include <modbus/modbus.h>
+
 #include "instances/io/modbus/config/map_values.hpp"
 #include "instances/io/modbus/config/modbus_config.hpp"
 
@@ -18,9 +20,17 @@ namespace plchost::modbus {
 struct LinkFailure {
   std::uint8_t exception = 0;  ///< the code of the device; 0: no answer, or garbage
   std::string text;
-  bool not_sent = false;   ///< the line is not open
-  bool not_asked = false;  ///< this process ends: nothing was sent, nothing is known of the device
-  bool at_rest = false;    ///< the connection had ended before the response began
+  bool not_sent = false;    ///< the line or the connection is not open
+  bool not_asked = false;   ///< this process ends: nothing was sent, nothing is known of the device
+  bool at_rest = false;     ///< the connection had ended before the response began
+  bool is_garbled = false;  ///< bytes came at a serial line, but no whole response of the device
+
+  /// The device has answered, and refuses the request. A gateway refuses with codes of its own if it does not
+  /// reach the device.
+  [[nodiscard]] bool is_refusal() const noexcept {
+    return exception != 0 && exception != MODBUS_EXCEPTION_GATEWAY_PATH &&
+           exception != MODBUS_EXCEPTION_GATEWAY_TARGET;
+  }
 };
 using LinkResult = std::expected<void, LinkFailure>;
 
@@ -44,8 +54,11 @@ struct ResponseShape {
 
 /// Asks for all of the map, which is a [[device.read]].
 [[nodiscard]] Pdu read_request(const RegisterMap& map) noexcept;
-/// Writes all of the map, which is a [[device.write]]. One register or coil has a function of its own: many
-/// devices have only that one, others only those for several.
+/// All of the map, which is a [[device.write]], is written by one request. False: each of its registers or
+/// coils needs one.
+[[nodiscard]] bool is_one_write(const RegisterMap& map) noexcept;
+/// Writes all of the map, for which is_one_write() holds. One register or coil has a function of its own:
+/// many devices have only that one, others only those for several.
 [[nodiscard]] Pdu write_request(const RegisterMap& map, MapValues& values) noexcept;
 
 /// The response to a read_request() of that map. The values change if all of it is good.

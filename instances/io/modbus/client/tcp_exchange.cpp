@@ -43,17 +43,16 @@ std::array<std::uint8_t, kTcpHeader> header_of(std::uint16_t number, std::uint8_
           static_cast<std::uint8_t>(length >> 8U), static_cast<std::uint8_t>(length), unit};
 }
 
+unsigned number_in(std::span<const std::uint8_t> header) {
+  return static_cast<unsigned>(header[0]) << 8U | header[1];
+}
+
 // The bytes behind the header.
-std::expected<std::size_t, ExchangeFailure> check_header(std::span<const std::uint8_t> header,
-                                                         std::uint16_t number, std::uint8_t unit) {
-  const unsigned answered = static_cast<unsigned>(header[0]) << 8U | header[1];
-  if (answered != number)
-    return failed(fmt::format("the response is of request {}, not of {}", answered, number));
+std::expected<std::size_t, ExchangeFailure> size_in(std::span<const std::uint8_t> header) {
   const std::size_t length = static_cast<std::size_t>(header[4]) << 8U | header[5];
   const bool is_modbus =
       header[2] == 0 && header[3] == 0 && length >= kLeastTcpLength && length <= kMaxPdu + 1;
   if (!is_modbus) return failed("the response is no Modbus");
-  if (header[6] != unit) return failed(fmt::format("the response is of unit {}, not of {}", header[6], unit));
   return length - 1;
 }
 
@@ -69,20 +68,29 @@ std::expected<Pdu, ExchangeFailure> exchange_tcp(int fd, std::uint16_t number, s
   if (::send(fd, frame.data(), size, MSG_NOSIGNAL | MSG_DONTWAIT) != static_cast<ssize_t>(size))
     return std::unexpected(ExchangeFailure{.at_rest = true, .text = std::strerror(errno)});
 
+  // A response to another request is late, or comes twice. The one to this request may follow.
   const auto header = std::span(frame).first(kTcpHeader);
-  if (auto got = receive(fd, header.first(1), deadline); !got) {
-    got.error().at_rest = MonotonicClock::now() < deadline;
-    return std::unexpected(std::move(got).error());
+  while (true) {
+    if (auto got = receive(fd, header.first(1), deadline); !got) {
+      got.error().at_rest = MonotonicClock::now() < deadline;
+      return std::unexpected(std::move(got).error());
+    }
+    if (auto got = receive(fd, header.subspan(1), deadline); !got)
+      return std::unexpected(std::move(got).error());
+    const auto rest = size_in(header);
+    if (!rest) return std::unexpected(rest.error());
+    Pdu response;
+    response.size = *rest;
+    if (auto got = receive(fd, std::span(response.bytes).first(*rest), deadline); !got)
+      return std::unexpected(std::move(got).error());
+    if (number_in(header) != number) {
+      if (MonotonicClock::now() >= deadline) return failed("the responses are of other requests");
+      continue;
+    }
+    if (header[6] != unit)
+      return failed(fmt::format("the response is of unit {}, not of {}", header[6], unit));
+    return response;
   }
-  if (auto got = receive(fd, header.subspan(1), deadline); !got)
-    return std::unexpected(std::move(got).error());
-  const auto rest = check_header(header, number, unit);
-  if (!rest) return std::unexpected(rest.error());
-  Pdu response;
-  response.size = *rest;
-  if (auto got = receive(fd, std::span(response.bytes).first(*rest), deadline); !got)
-    return std::unexpected(std::move(got).error());
-  return response;
 }
 
 bool is_usable(int fd) noexcept {

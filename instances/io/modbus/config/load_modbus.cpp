@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -25,7 +26,7 @@ namespace {
 
 constexpr std::size_t kMostProblems = 100;  // more are not told
 constexpr std::array kSections = {"modbus"sv, "image"sv, "device"sv, "server"sv};
-constexpr std::array kOnlySerial = {"baud"sv, "parity"sv, "stop_bits"sv};
+constexpr std::array kOnlySerial = {"baud"sv, "parity"sv, "stop_bits"sv, "probe"sv};
 constexpr std::uint8_t kLastSerialUnit = 247;
 constexpr std::uint8_t kUnitOfTcp = 255;  // of a device that is no gateway
 
@@ -138,7 +139,26 @@ class Loader {
     if (!table.contains("read") && !table.contains("write")) {
       reader.problem("name", "the device has no map; add [[device.read]] or [[device.write]]");
     }
+    if (!device.serial.empty() && !reader.wrong("timeout_ms") && !reader.wrong("baud"))
+      check_time(reader, device);
     config_.devices.push_back(std::move(device));
+  }
+  // The time limit of a response begins with its request, and ends with its last byte.
+  static void check_time(SectionReader& reader, const DeviceConfig& device) {
+    constexpr std::int64_t kAround = 5;  // unit, function, number of bytes, checksum
+    const std::int64_t character = 9 + device.stop_bits + (device.parity == Parity::none ? 0 : 1);
+    for (const RegisterMap& map : device.reads) {
+      const std::int64_t bits = (kAround + static_cast<std::int64_t>(size_in_bits(map) + 7) / 8) * character;
+      const auto needed =
+          std::chrono::ceil<std::chrono::milliseconds>(Duration(std::chrono::seconds(bits)) / device.baud);
+      if (needed < device.timeout) continue;
+      reader.problem(
+          "timeout_ms",
+          fmt::format("the response of the map in line {} alone takes {} ms at {} baud; allowed is "
+                      "more, or give the map a smaller count",
+                      map.line, needed.count(), device.baud));
+      return;
+    }
   }
   static void check_way(SectionReader& reader, const DeviceConfig& device) {
     if (reader.wrong("tcp") || reader.wrong("serial")) return;
@@ -154,7 +174,12 @@ class Loader {
         reader.problem("unit", fmt::format("{} is reserved; allowed is 0 to {}, and {}", int{device.unit},
                                            int{kLastSerialUnit}, int{kUnitOfTcp}));
       }
-    } else if (device.unit == 0 || device.unit > kLastSerialUnit) {
+      return;
+    }
+    if (reader.has("share_connection")) {
+      reader.problem("share_connection", "is for tcp, and the device has serial; leave it out");
+    }
+    if (device.unit == 0 || device.unit > kLastSerialUnit) {
       reader.problem("unit", fmt::format("{} is no address at a serial line; allowed is 1 to {}",
                                          int{device.unit}, int{kLastSerialUnit}));
     }
@@ -208,6 +233,7 @@ class Loader {
           map.line = line;
           SectionReader reader = reader_of(table, line, fmt::format("{} number {}", where, index + 1));
           read_rows(map_keys(), ModbusReading{}, reader, map);
+          if (use == MapUse::device_read) read_rows(read_map_keys(), ModbusReading{}, reader, map);
           if (use == MapUse::device_write) read_rows(write_map_keys(), ModbusReading{}, reader, map);
           if (use == MapUse::server) read_rows(server_map_keys(), ModbusReading{}, reader, map);
           reader.refuse_unknown_keys();

@@ -30,6 +30,13 @@ enum class ImageDirection : std::uint8_t {
   output,  ///< written by the PLC
 };
 
+/// The function that writes a map. The order is that of kFunctionNames.
+enum class WriteFunction : std::uint8_t {
+  automatic,  ///< single for one register or coil, several for more
+  single,     ///< 6 or 5: a request for each register or coil
+  several,    ///< 16 or 15, for one as well
+};
+
 /// The values of inputs that are not refreshed any more.
 enum class LossPolicy : std::uint8_t { keep, zero };
 
@@ -58,8 +65,10 @@ struct RegisterMap {
   std::uint32_t offset = 0;
   std::uint8_t bit = 0;
   RegisterOrder order = RegisterOrder::single;
-  Duration rewrite = std::chrono::seconds(1);  ///< [[device.write]]; 0: only when it has changed
-  bool writable = false;                       ///< [[server.map]]
+  Duration rewrite = std::chrono::seconds(1);         ///< [[device.write]]; 0: only when it has changed
+  WriteFunction function = WriteFunction::automatic;  ///< [[device.write]]
+  bool optional = false;                              ///< [[device.read]]
+  bool writable = false;                              ///< [[server.map]]
   unsigned line = 0;
 };
 
@@ -72,6 +81,8 @@ struct DeviceConfig {
   Parity parity = Parity::even;
   int stop_bits = 1;
   std::uint8_t unit = 1;
+  bool share_connection = true;  ///< on TCP, with the other devices of its address
+  bool probe = true;             ///< at a serial line: reads that tell late responses apart
   Duration poll = std::chrono::milliseconds(100);
   Duration timeout = std::chrono::milliseconds(500);
   Duration reconnect = std::chrono::milliseconds(500);  ///< doubles with each failure in a row

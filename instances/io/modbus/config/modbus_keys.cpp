@@ -133,6 +133,15 @@ constexpr std::array kDeviceKeys = {
     key<&DeviceConfig::unit, NumberKey<0, 255>>(
         "[[device]]",
         {.name = "unit", .meaning = "unit identifier; at a serial line 1 to 247, which is its address"}),
+    key<&DeviceConfig::share_connection, TruthKey>(
+        "[[device]]", {.name = "share_connection",
+                       .meaning = "on TCP: units of one address take turns on one connection, as gateways "
+                                  "need that have only one. False: a connection of its own"}),
+    key<&DeviceConfig::probe, TruthKey>(
+        "[[device]]",
+        {.name = "probe",
+         .meaning = "at a serial line: reads that [tell late responses apart](#devices). False: "
+                    "for a device that does not answer these"}),
     key<&DeviceConfig::poll, PollKey>(
         "[[device]]", {.name = "poll_ms", .meaning = "time between two polls, on a fixed grid"}),
     key<&DeviceConfig::timeout, TimeoutKey>(
@@ -213,7 +222,19 @@ constexpr std::array kMapKeys = {
                     "highest byte first on the wire, `cdab` the low register first"}),
 };
 
+constexpr std::array kReadMapKeys = {
+    key<&RegisterMap::optional, TruthKey>(
+        "[[device.read]]", {.name = "optional",
+                            .meaning = "the device may refuse it: its values are as `when_gone` says, and "
+                                       "the others are read"}),
+};
+
 constexpr std::array kWriteMapKeys = {
+    key<&RegisterMap::function, WordKey<kFunctionNames>>(
+        "[[device.write]]",
+        {.name = "function",
+         .meaning = "`single`: 6 or 5, a request for each register or coil. `several`: 16 or 15, also for "
+                    "one. `auto`: `single` for a `count` of 1, else `several`"}),
     key<&RegisterMap::rewrite, OptionalTimeKey>(
         "[[device.write]]",
         {.name = "rewrite_ms",
@@ -232,7 +253,7 @@ static_assert(kProcessKeys.size() == count_members<ProcessConfig>(), "each key o
 static_assert(kImageKeys.size() + 1 == count_members<ImageConfig>(), "each key of [[image]] has its row");
 static_assert(kDeviceKeys.size() + 3 == count_members<DeviceConfig>(), "each key of [[device]] has its row");
 static_assert(kServerKeys.size() + 2 == count_members<ServerConfig>(), "each key of [server] has its row");
-static_assert(kMapKeys.size() + kWriteMapKeys.size() + kServerMapKeys.size() + 1 ==
+static_assert(kMapKeys.size() + kReadMapKeys.size() + kWriteMapKeys.size() + kServerMapKeys.size() + 1 ==
                   count_members<RegisterMap>(),
               "each key of a map has its row");
 
@@ -253,6 +274,9 @@ std::span<const ModbusRow<ServerConfig>> server_keys() noexcept {
 std::span<const ModbusRow<RegisterMap>> map_keys() noexcept {
   return kMapKeys;
 }
+std::span<const ModbusRow<RegisterMap>> read_map_keys() noexcept {
+  return kReadMapKeys;
+}
 std::span<const ModbusRow<RegisterMap>> write_map_keys() noexcept {
   return kWriteMapKeys;
 }
@@ -267,6 +291,7 @@ std::string modbus_key_table() {
   add_section(kDeviceKeys, table);
   add_section(kServerKeys, table);
   add_section(kMapKeys, table);
+  add_section(kReadMapKeys, table);
   add_section(kWriteMapKeys, table);
   add_section(kServerMapKeys, table);
   return table;

@@ -18,6 +18,7 @@ inline constexpr std::array kKindNames = {"coil"sv, "discrete_input"sv, "holding
 inline constexpr std::array kOrderNames = {"single"sv, "abcd"sv, "cdab"sv, "badc"sv, "dcba"sv};
 inline constexpr std::array kDirectionNames = {"input"sv, "output"sv};
 inline constexpr std::array kLossNames = {"keep"sv, "zero"sv};
+inline constexpr std::array kFunctionNames = {"auto"sv, "single"sv, "several"sv};
 inline constexpr std::array kParityNames = {"none"sv, "even"sv, "odd"sv};
 
 /// One key of the file, as people are told of it.
@@ -40,6 +41,7 @@ using ModbusRow = KeyRow<ModbusKey, Config, ModbusReading>;
 [[nodiscard]] std::span<const ModbusRow<DeviceConfig>> device_keys() noexcept;
 [[nodiscard]] std::span<const ModbusRow<ServerConfig>> server_keys() noexcept;
 [[nodiscard]] std::span<const ModbusRow<RegisterMap>> map_keys() noexcept;         ///< of all three
+[[nodiscard]] std::span<const ModbusRow<RegisterMap>> read_map_keys() noexcept;    ///< beside map_keys()
 [[nodiscard]] std::span<const ModbusRow<RegisterMap>> write_map_keys() noexcept;   ///< beside map_keys()
 [[nodiscard]] std::span<const ModbusRow<RegisterMap>> server_map_keys() noexcept;  ///< beside map_keys()
 
