@@ -14,6 +14,7 @@
 #include "manager/server_files.hpp"
 #include "shm/files/memory_rights.hpp"
 #include "shm/files/own_folder.hpp"
+#include "shm/files/replace_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/foreign_files.hpp"
 
@@ -76,8 +77,9 @@ void Manager::share_folders() {
   const auto shared = share_with_instances(host.run_directory, users);
   if (!shared) spdlog::error("[host] run_directory: instances may lack it: {}", shared.error().describe());
   const auto share = [folder = host.state_directory, users]() -> Result<void> {
+    constexpr mode_t kModeWithoutMask = 0777;
     std::error_code error;
-    if (!users.empty()) std::filesystem::create_directories(folder, error);
+    if (!users.empty()) PLCHOST_TRY(make_synced_folders(folder, kModeWithoutMask));
     if (users.empty() && !std::filesystem::exists(folder, error)) return {};
     return share_with_instances(folder, users);
   };

@@ -1,7 +1,6 @@
 #include "manager/server_files.hpp"
 
 #include <cerrno>
-#include <filesystem>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/memory_rights.hpp"
+#include "shm/files/replace_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/process/user_account.hpp"
 
@@ -69,11 +69,7 @@ Result<void> share(int folder, const std::string& path, GroupRight right, int de
 }  // namespace
 
 Result<void> share_folder(const std::string& path, GroupRight right, std::optional<gid_t> folders_group) {
-  std::error_code error;
-  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
-  if (error) return failure(ErrorCode::system, "cannot make the folder of " + path, error.value());
-  if (::mkdir(path.c_str(), S_IRWXU) != 0 && errno != EEXIST)
-    return failure(ErrorCode::system, "cannot create folder " + path, errno);
+  PLCHOST_TRY(make_synced_folders(path, S_IRWXU));
   const UniqueFd fd(::open(path.c_str(), kFolderFlags));
   if (!fd) return failure(ErrorCode::system, "cannot open folder " + path, errno);
   const gid_t group = folders_group.value_or(::getegid());
@@ -96,8 +92,7 @@ void hand_over_ledger(const std::string& pool, const std::optional<UserAccount>&
 }
 
 Result<void> keep_folder(const std::string& path) {
-  if (::mkdir(path.c_str(), S_IRWXU) != 0 && errno != EEXIST)
-    return failure(ErrorCode::system, "cannot create folder " + path, errno);
+  PLCHOST_TRY(make_synced_folder(path, S_IRWXU));
   const UniqueFd fd(::open(path.c_str(), kFolderFlags));
   struct stat status{};
   if (!fd || ::fstat(fd.get(), &status) != 0)

@@ -43,21 +43,9 @@ mode_t file_mode(const StoreOrder& order) {
 }
 
 Result<void> make_folder(const std::string& folder) {
-  using std::filesystem::perms;
-  std::error_code error;
-  const std::filesystem::path path(folder);
-  if (std::filesystem::is_directory(path, error)) return {};
-  const bool is_first = !std::filesystem::is_directory(path.parent_path(), error);
-  const bool shared = !is_first && group_reads(path.parent_path());
-  std::filesystem::create_directories(path, error);
-  if (error) return failure(ErrorCode::system, "cannot create folder " + folder, error.value());
-  for (const auto& made : {path, path.parent_path()}) {
-    std::filesystem::permissions(
-        made, shared ? perms::owner_all | perms::group_read | perms::group_exec : perms::owner_all, error);
-    if (error) return failure(ErrorCode::system, "cannot set the rights of " + made.string(), error.value());
-    if (auto synced = sync_directory(made.parent_path()); !synced) return synced;
-  }
-  return {};
+  const std::filesystem::path of_the_host = std::filesystem::path(folder).parent_path();
+  PLCHOST_TRY(make_synced_folders(of_the_host, S_IRWXU));
+  return make_synced_folder(folder, group_reads(of_the_host) ? S_IRWXU | S_IRGRP | S_IXGRP : S_IRWXU);
 }
 
 // The left-overs of a helper that did not come to its end.
@@ -172,12 +160,13 @@ void remove_oldest(const StoreOrder& order, const std::set<std::string>& used) {
   std::size_t count = versions.kept.size();
   std::error_code error;
   for (const ApplicationVersion& version : versions.kept) {
-    if (count <= order.keep) return;
+    if (count <= order.keep) break;
     if (used.contains(version.path)) continue;
     std::filesystem::remove(description_path(version.path), error);
     std::filesystem::remove(version.path, error);
     --count;
   }
+  (void)sync_directory(order.folder);  // else a power cut brings them back, which only takes room
 }
 
 Result<std::string> keep_file(const StoreOrder& order) {

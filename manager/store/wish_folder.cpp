@@ -1,10 +1,9 @@
 #include "manager/store/wish_folder.hpp"
 
-#include <filesystem>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include "shm/files/replace_file.hpp"
 
@@ -24,13 +23,7 @@ std::string wishes_folder(std::string_view state_directory, std::string_view hos
 }
 
 Result<void> make_wish_folder(const std::string& folder) {
-  std::error_code error;
-  if (std::filesystem::is_directory(folder, error)) return {};
-  std::filesystem::create_directories(folder, error);
-  if (error) return failure(ErrorCode::system, "cannot create folder " + folder, error.value());
-  std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
-  if (error) return failure(ErrorCode::system, "cannot set the rights of " + folder, error.value());
-  return sync_directory(std::filesystem::path(folder).parent_path());
+  return make_synced_folders(folder, S_IRWXU);
 }
 
 Result<void> WishFolderLock::take(DiskThread& disk, const std::string& folder, Duration limit,

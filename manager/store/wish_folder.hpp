@@ -19,7 +19,7 @@ inline constexpr Duration kWishFolderLimit = std::chrono::seconds(2);
 /// The folder of the files: "STATE_DIRECTORY/wishes.HOST".
 [[nodiscard]] std::string wishes_folder(std::string_view state_directory, std::string_view host);
 
-/// Makes the folder if it is missing, for this user only. May wait for the disk.
+/// Makes the folder for good if it is missing, for this user only. May wait for the disk.
 [[nodiscard]] Result<void> make_wish_folder(const std::string& folder);
 
 /// The one manager that writes to a wishes_folder(): it holds "manager.lock" there. Two managers in one

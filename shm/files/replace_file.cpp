@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
@@ -30,6 +31,28 @@ Result<void> sync_directory(const std::string& path) {
   if (!fd) return failure(ErrorCode::system, "cannot open " + path, errno);
   PLCHOST_TRY(check_errno(::fsync(fd.get()), "cannot sync " + path));
   return {};
+}
+
+Result<void> make_synced_folder(const std::string& path, mode_t mode) {
+  const std::filesystem::path above = std::filesystem::path(path).parent_path();
+  const bool made = ::mkdir(path.c_str(), mode) == 0;
+  if (!made && errno != EEXIST) return failure(ErrorCode::system, "cannot create folder " + path, errno);
+  // One that was there is synced as well: the process that made it may have been killed before it did. Not
+  // every user of a folder may read the one above it.
+  auto synced = sync_directory(above.empty() ? "." : above.string());
+  return made || (!synced && synced.error().system_errno != EACCES) ? synced : Result<void>();
+}
+
+Result<void> make_synced_folders(const std::string& path, mode_t mode) {
+  constexpr mode_t kModeOfOthers = 0777;
+  std::filesystem::path folder(path);
+  if (!folder.has_filename()) folder = folder.parent_path();
+  const std::filesystem::path above = folder.parent_path();
+  std::error_code error;
+  if (!above.empty() && !std::filesystem::exists(above, error)) {
+    PLCHOST_TRY(make_synced_folders(above, kModeOfOthers));
+  }
+  return make_synced_folder(folder, mode);
 }
 
 Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode) {

@@ -1,14 +1,17 @@
 #include "instances/runtime/memory/retain_files.hpp"
 
 #include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <utility>
 
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
 #include "shm/files/own_folder.hpp"
 #include "shm/files/replace_file.hpp"
 
@@ -36,6 +39,21 @@ std::string stem_of(const std::string& directory, const std::string& instance) {
   return fmt::format("{}/{}.retain", directory, instance);
 }
 
+// Of any size: it may be no file of ours. The copy is whole before it takes the place of the one before.
+Result<void> put_copy_aside(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return {};
+  const std::string aside = path + ".old";
+  const std::string fresh = aside + ".new";
+  std::filesystem::copy_file(path, fresh, std::filesystem::copy_options::overwrite_existing, error);
+  if (error) return failure(ErrorCode::system, "cannot copy " + path + " to " + fresh, error.value());
+  const UniqueFd copy(::open(fresh.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+  if (!copy) return failure(ErrorCode::system, "cannot open " + fresh, errno);
+  PLCHOST_TRY(check_errno(::fsync(copy.get()), "cannot sync " + fresh));
+  if (::rename(fresh.c_str(), aside.c_str()) == 0) return {};
+  return failure(ErrorCode::system, "cannot rename " + fresh, errno);
+}
+
 }  // namespace
 
 auto RetainFiles::look(const std::string& directory, const std::string& instance) -> Found {
@@ -52,10 +70,10 @@ Result<RetainFiles> RetainFiles::open(const std::string& directory, const std::s
 Result<void> RetainFiles::take() {
   if (lock_) return {};
   constexpr mode_t kMode = 0755;
-  const int error = ::mkdir(directory_.c_str(), kMode) == 0 ? 0 : errno;
-  if (error != 0 && error != EEXIST && error != EROFS) {
-    return failure(ErrorCode::system,
-                   fmt::format("cannot create the folder for retain variables {}", directory_), error);
+  const auto made = make_synced_folder(directory_, kMode);
+  if (!made && made.error().system_errno != EROFS) {
+    return failure(ErrorCode::system, "folder for retain variables: " + made.error().message,
+                   made.error().system_errno);
   }
   PLCHOST_TRY(in_step("folder for retain variables", check_own_folder(directory_)));
   auto held = LockFile::take(stem_ + ".lock");
@@ -108,13 +126,11 @@ Result<void> RetainFiles::write(const RetainImage& image) {
   return sync_directory(directory_);
 }
 
-void RetainFiles::put_aside(std::bitset<2> which) const {
+Result<void> RetainFiles::put_aside(std::bitset<2> which) const {
   for (std::uint64_t file = 0; file < 2; ++file) {
-    if (!which[file]) continue;
-    std::error_code error;  // one that is not there needs no place
-    std::filesystem::copy_file(path(file), path(file) + ".old",
-                               std::filesystem::copy_options::overwrite_existing, error);
+    if (which[file]) PLCHOST_TRY(put_copy_aside(path(file)));
   }
+  return which.any() ? sync_directory(directory_) : Result<void>();
 }
 
 }  // namespace plchost

@@ -38,8 +38,9 @@ class RetainFiles {
   /// that may wait for a disk.
   [[nodiscard]] Result<void> write(const RetainImage& image);
 
-  /// Puts copies of those files aside, under INSTANCE.retain.0.old and .1.old. Set-up.
-  void put_aside(std::bitset<2> which) const;
+  /// Puts copies of those files aside, under INSTANCE.retain.0.old and .1.old. They are on the disk when it
+  /// returns well. system: which one is not. Set-up, or a thread that may wait for a disk.
+  [[nodiscard]] Result<void> put_aside(std::bitset<2> which) const;
 
  private:
   RetainFiles(std::string stem, std::string directory)

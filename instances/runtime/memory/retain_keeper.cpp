@@ -167,7 +167,7 @@ Result<void> RetainKeeper::start() {
     PLCHOST_TRY_ASSIGN(thread_, Thread::start("retain", {}, [this] { run(); }));
   }
   // Before the memory of then is replaced: a start after a kill finds nothing to put aside.
-  if (files_) files_->put_aside(aside_);
+  if (files_) put_aside(aside_);
   if (auto published = memory_.publish(pool_, name_); !published) return published;
   save_first();
   const std::lock_guard lock(mutex_);
@@ -346,8 +346,14 @@ void RetainKeeper::put_strange_files_aside() {
   if (!found.newest || found.newest->generation <= image_.generation) return;
   spdlog::warn(
       "retain variables: files were found that could not be read at the start; they are put aside as .old");
-  files_->put_aside(std::bitset<2>().set());
+  put_aside(std::bitset<2>().set());
   image_.generation = found.newest->generation;
+}
+
+// A disk that does not take the copies keeps no machine from its start.
+void RetainKeeper::put_aside(std::bitset<2> which) const {
+  if (const auto done = files_->put_aside(which); !done)
+    spdlog::warn("retain variables: the files of before are not put aside: {}", done.error().describe());
 }
 
 void RetainKeeper::count_unsaved() noexcept {

@@ -90,6 +90,7 @@ class RetainKeeper {
   [[nodiscard]] bool rest();
   [[nodiscard]] Result<void> write();
   void put_strange_files_aside();
+  void put_aside(std::bitset<2> which) const;
   /// Why it is not saved; the worst first.
   enum class Fault : std::uint8_t { memory, files, cycles };
   static constexpr std::size_t kFaults = 3;

@@ -50,5 +50,18 @@ TEST_F(ReplaceFile, WhatCannotBeWrittenLeavesTheOldContents) {
   EXPECT_EQ(contents(), "kept");
 }
 
+TEST_F(ReplaceFile, FoldersAreMadeWithTheirRightsAndThoseThatAreThereStayAsTheyAre) {
+  namespace fs = std::filesystem;
+  ASSERT_TRUE(make_synced_folders(directory + "/a/b/", 0700));
+  EXPECT_EQ(fs::status(directory + "/a/b").permissions(), fs::perms::owner_all);
+  ASSERT_TRUE(make_synced_folders(directory + "/a/b", 0750));
+  EXPECT_EQ(fs::status(directory + "/a/b").permissions(), fs::perms::owner_all);
+  ASSERT_TRUE(make_synced_folder(directory + "/a/c", 0700));
+  const auto without_parent = make_synced_folder(directory + "/d/e", 0700);
+  ASSERT_FALSE(without_parent);
+  EXPECT_EQ(without_parent.error().describe(),
+            "cannot create folder " + directory + "/d/e: No such file or directory");
+}
+
 }  // namespace
 }  // namespace plchost
