@@ -12,14 +12,15 @@ namespace plchost {
 void AuditWalk::take(const std::string& where, std::string_view line) {
   const auto link = read_link(line);
   if (!link) {
-    end();
-    unexplained_ = fmt::format("{}: {}", where, link.error().message);
+    if (unexplained_.size() < AuditFindings::kMostProblems)
+      unexplained_.push_back(fmt::format("{}: {}", where, link.error().message));
     return;
   }
-  // A process that was killed while it wrote leaves half a line; the next one says so and goes on.
-  if (unexplained_ && link->what == "repair") {
+  // A process that was killed while it wrote leaves half a line, and a power cut several; the next one says
+  // so and goes on.
+  if (!unexplained_.empty() && link->what == "repair") {
     findings_.remarks.push_back(fmt::format("{}: a record before was not completed", where));
-    unexplained_.reset();
+    unexplained_.clear();
   }
   end();
   if (link->what == "gap") {
@@ -31,8 +32,8 @@ void AuditWalk::take(const std::string& where, std::string_view line) {
 }
 
 void AuditWalk::end() {
-  if (unexplained_) problem(*unexplained_);
-  unexplained_.reset();
+  for (const std::string& each : unexplained_) problem(each);
+  unexplained_.clear();
 }
 
 void AuditWalk::compare(const std::string& where, const AuditLink& link) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,7 +35,7 @@ class AuditWalk {
   void problem(const std::string& text);
 
   AuditFindings& findings_;
-  std::optional<std::string> unexplained_;  // a problem, unless the next record explains it
+  std::vector<std::string> unexplained_;  // problems, unless the next record explains them
 };
 
 /// Goes through the whole chain. not_found: no log is in the folder. system: it cannot be read.

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "api/audit/audit_record.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -18,5 +20,14 @@ struct AuditFile {
 [[nodiscard]] std::string audit_file_name(std::uint64_t first);
 /// Those in the folder, in order. system: it cannot be read.
 [[nodiscard]] Result<std::vector<AuditFile>> audit_files(const std::string& folder);
+
+/// How a file of the log ends.
+struct AuditEnd {
+  std::optional<AuditHead> head;   ///< of the last record that can be read; nothing: there is none
+  bool head_is_last = true;        ///< nothing is behind it
+  bool last_line_is_whole = true;  ///< it has its newline
+};
+/// system: it cannot be read.
+[[nodiscard]] Result<AuditEnd> read_end(const std::string& path);
 
 }  // namespace plchost

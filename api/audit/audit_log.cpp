@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <condition_variable>
-#include <filesystem>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -19,6 +18,7 @@
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/replace_file.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 
@@ -63,11 +63,7 @@ AuditLog::~AuditLog() {
 }
 
 Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
-  std::error_code error;
-  if (std::filesystem::create_directories(options.folder, error)) {
-    std::filesystem::permissions(options.folder, std::filesystem::perms::owner_all, error);
-  }
-  if (error) return failure(ErrorCode::system, "cannot create folder " + options.folder, error.value());
+  PLCHOST_TRY(make_synced_folders(options.folder, S_IRWXU));
   PLCHOST_TRY_ASSIGN(auto lock, lock_folder(options.folder));
   std::unique_ptr<AuditLog> log(new AuditLog(std::move(options), std::move(lock)));
   PLCHOST_TRY(log->go_on());
@@ -82,10 +78,8 @@ Result<void> AuditLog::go_on() {
     PLCHOST_TRY(open_file(options_.folder + "/" + audit_file_name(1)));
     return write(of_the_log("begin", "the first record of this log"));
   }
-  const AuditFile& last = files.back();
-  head_.number = last.first - 1;  // unless a record is found in it
-  PLCHOST_TRY(open_file(last.path));
-  return find_end(last.path);
+  PLCHOST_TRY(open_file(files.back().path));
+  return find_end(files);
 }
 
 Result<void> AuditLog::open_file(const std::string& path) {
@@ -97,6 +91,8 @@ Result<void> AuditLog::open_file(const std::string& path) {
   if (made) PLCHOST_TRY(check_errno(::fchmod(fd.get(), mode), "cannot set the rights of " + path));
   struct stat status{};
   PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
+  // Its name; also of one that a process has made that was killed then.
+  PLCHOST_TRY(sync_directory(options_.folder));
   bytes_ = static_cast<std::size_t>(status.st_size);
   const std::lock_guard lock(guard_);
   file_ = std::move(fd);
@@ -104,38 +100,31 @@ Result<void> AuditLog::open_file(const std::string& path) {
   return {};
 }
 
-// The last record, and what a process that was killed has left half-written behind it.
-Result<void> AuditLog::find_end(const std::string& path) {
-  constexpr std::size_t kTail = std::size_t{64} << 10;  // many times a record
-  std::string tail(std::min(bytes_, kTail), '\0');
-  const auto begin = static_cast<off_t>(bytes_ - tail.size());
-  const auto got = ::pread(file_.get(), tail.data(), tail.size(), begin);
-  if (got < 0) return failure(ErrorCode::system, "cannot read " + path, errno);
-  tail.resize(static_cast<std::size_t>(got));
-  if (tail.empty()) return write(of_the_log("repair", "this file was empty"));
-  if (tail.back() != '\n') {
+// A process that was killed leaves half a record behind the last one. A power cut leaves any bytes there, or
+// a file without a record.
+Result<void> AuditLog::find_end(const std::vector<AuditFile>& files) {
+  const std::string& path = files.back().path;
+  PLCHOST_TRY_ASSIGN(AuditEnd end, read_end(path));
+  if (!end.last_line_is_whole) {
     if (::write(file_.get(), "\n", 1) != 1) return failure(ErrorCode::system, "cannot write " + path, errno);
     ++bytes_;
-    tail += '\n';
   }
-  for (std::size_t end = tail.size() - 1;;) {  // of a line: its newline
-    const std::size_t before = end == 0 ? std::string::npos : tail.rfind('\n', end - 1);
-    const std::size_t begin_of_line = before + 1;  // npos + 1: the first one
-    if (const auto link = read_link(std::string_view(tail).substr(begin_of_line, end - begin_of_line))) {
-      head_ = {.number = link->number, .hash = link->hash};
-      if (end == tail.size() - 1) return {};
-      break;
-    }
-    if (before == std::string::npos) break;
-    end = before;
+  const bool is_whole = end.head && end.head_is_last;
+  for (auto file = files.rbegin() + 1; !end.head && file != files.rend(); ++file) {
+    PLCHOST_TRY_ASSIGN(end, read_end(file->path));
   }
-  return write(
-      of_the_log("repair", fmt::format("the records before were not complete, or changed; goes on after "
-                                       "record {}",
-                                       head_.number)));
+  head_ = end.head.value_or(AuditHead{.number = files.back().first - 1});
+  if (is_whole) return {};
+  return write(of_the_log(
+      "repair", bytes_ == 0 ? "this file was empty"
+                            : fmt::format("the records before were not complete, or changed; goes on after "
+                                          "record {}",
+                                          head_.number)));
 }
 
+// The records of a file are on the disk before another one begins: from then on nobody syncs it.
 Result<void> AuditLog::next_file() {
+  PLCHOST_TRY(check_errno(::fdatasync(file_.get()), "cannot sync the audit log in " + options_.folder));
   PLCHOST_TRY_ASSIGN(const auto files, audit_files(options_.folder));
   for (std::size_t i = 0; i + options_.most_files <= files.size(); ++i) ::unlink(files[i].path.c_str());
   return open_file(options_.folder + "/" + audit_file_name(head_.number + 1));
@@ -165,6 +154,11 @@ Result<void> AuditLog::append(const AuditRecord& record) {
       PLCHOST_TRY(write(of_the_log("gap", count_text(missed_, "record") + " could not be written")));
       missed_ = 0;
     }
+    if (sync_failed_) {
+      PLCHOST_TRY(
+          write(of_the_log("gap", "the disk reported an error: records before may be missing on it")));
+      sync_failed_ = false;
+    }
     return write(record);
   };
   auto done = all();
@@ -184,8 +178,33 @@ void AuditLog::sync_until_stopped(const std::stop_token& stop) {
       if (!std::exchange(dirty_, false)) continue;
       file.reset(::fcntl(file_.get(), F_DUPFD_CLOEXEC, 0));
     }
-    ::fdatasync(file.get());
+    if (::fdatasync(file.get()) == 0) {
+      tell_sync("");
+      continue;
+    }
+    const auto error = failure(ErrorCode::system, "cannot sync the audit log in " + options_.folder, errno);
+    sync_failed_ = true;
+    tell_sync(error.error().describe());
+    const std::lock_guard lock(guard_);
+    dirty_ = true;
   }
+}
+
+void AuditLog::tell_sync(const std::string& problem) {
+  {
+    const std::lock_guard lock(guard_);
+    if (std::exchange(sync_problem_, problem) == problem) return;
+  }
+  if (problem.empty()) {
+    spdlog::info("the audit log in {} is on the disk again", options_.folder);
+  } else {
+    spdlog::error("records of the audit log may not survive a loss of power: {}", problem);
+  }
+}
+
+std::string AuditLog::sync_problem() const {
+  const std::lock_guard lock(guard_);
+  return sync_problem_;
 }
 
 }  // namespace plchost

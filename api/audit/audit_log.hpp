@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -7,7 +8,9 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
+#include "api/audit/audit_file.hpp"
 #include "api/audit/audit_record.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -16,7 +19,8 @@ namespace plchost {
 
 /// Each change and its client, in files that are only appended to. Each record carries the hash of the one
 /// before, so that a change of any of them shows (see check_audit). A record survives, when append() has
-/// returned, the death of this process, and within kSyncPeriod a loss of power. One thread; one log for each
+/// returned, the end of this process. The disk gets it within kSyncPeriod: from then on it survives a loss of
+/// power. One thread; one log for each
 /// folder.
 class AuditLog {
  public:
@@ -40,24 +44,29 @@ class AuditLog {
   /// So many records were lost before they came here: the next one that can be written tells of them, too.
   void miss(std::uint64_t records) noexcept { missed_ += records; }
   [[nodiscard]] const AuditHead& head() const noexcept { return head_; }
+  /// Why the disk has not taken the newest records for good; empty: it has, or is about to. Any thread.
+  [[nodiscard]] std::string sync_problem() const;
 
  private:
   AuditLog(Options options, UniqueFd lock) noexcept;
   Result<void> go_on();
   Result<void> open_file(const std::string& path);
-  Result<void> find_end(const std::string& path);
+  Result<void> find_end(const std::vector<AuditFile>& files);
   Result<void> next_file();
   Result<void> write(const AuditRecord& record);
   void sync_until_stopped(const std::stop_token& stop);
+  void tell_sync(const std::string& problem);
 
   Options options_;
   UniqueFd lock_;
   AuditHead head_;
-  std::size_t bytes_ = 0;     // of the file
-  std::uint64_t missed_ = 0;  // records that could not be written
-  std::mutex guard_;          // of what follows
+  std::size_t bytes_ = 0;                 // of the file
+  std::uint64_t missed_ = 0;              // records that could not be written
+  std::atomic<bool> sync_failed_{false};  // and the log does not tell it yet
+  mutable std::mutex guard_;              // of what follows
   UniqueFd file_;
   bool dirty_ = false;
+  std::string sync_problem_;
   std::jthread syncer_;
 };
 

@@ -63,6 +63,9 @@ AuditHead AuditWriter::head() const {
 std::string AuditWriter::problem(TimePoint now) const {
   const std::lock_guard lock(mutex_);
   if (!failure_.empty()) return failure_;
+  if (head_.number > 0 && !at_disk_) {  // it was opened before, and stays so
+    if (auto unsynced = logs_.done->sync_problem(); !unsynced.empty()) return unsynced;
+  }
   if (!at_disk_ || now - *at_disk_ < kSlow) return {};
   return head_.number == 0 ? "the disk does not answer; the log is not open yet, changes wait in memory"
                            : "the disk does not answer; changes wait in memory";

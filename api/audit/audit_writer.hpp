@@ -74,7 +74,7 @@ class AuditWriter {
 
   Open open_;
   std::function<void()> on_written_;
-  AuditLogs logs_;  // of the writing thread
+  AuditLogs logs_;  // of the writing thread; not another one once head_ has a number
   std::atomic<Ticket> written_{0};
   std::atomic<bool> cannot_open_{false};
   mutable std::mutex mutex_;

@@ -163,6 +163,41 @@ TEST_F(AuditLogTest, AWriterKilledWithinARecordCostsThatRecordOnlyWhereverItWas)
   }
 }
 
+// As a power cut leaves it: more than one look at the end of the file takes.
+TEST_F(AuditLogTest, GoesOnBehindMoreZerosThanRecordsHaveBytes) {
+  fill(2);
+  const std::string whole = contents(first_file());
+  for (const std::size_t zeros : {std::size_t{1}, std::size_t{100'000}, std::size_t{300'000}}) {
+    write(first_file(), whole + std::string(zeros, '\0'));
+    ASSERT_TRUE(open()->append(stop_of("line9")));
+    const AuditFindings found = check();
+    ASSERT_THAT(found.problems, IsEmpty()) << zeros << " zeros";
+    ASSERT_EQ(found.remarks.size(), 1U);
+    ASSERT_EQ(found.head.number, 5U);
+  }
+}
+
+TEST_F(AuditLogTest, GoesOnBehindSeveralLinesThatCannotBeRead) {
+  fill(2);
+  std::ofstream(first_file(), std::ios::app) << std::string(600, '\0') << "\"}\n{\"n\":7\n{";
+  ASSERT_TRUE(open()->append(stop_of("line9")));
+  EXPECT_THAT(check().problems, IsEmpty());
+  EXPECT_THAT(check().remarks, ElementsAre(HasSubstr("a record before was not completed")));
+}
+
+TEST_F(AuditLogTest, IsOneChainOverAFileThatGotNoRecordBeforeThePowerWasCut) {
+  fill(2);
+  for (const std::string_view left : {"", "half a rec"}) {
+    const auto files = audit_files(folder).value();
+    const auto head = check().head.number;
+    write(folder + "/" + audit_file_name(head + 1), std::string(left));
+    ASSERT_TRUE(open()->append(stop_of("line9")));
+    EXPECT_EQ(audit_files(folder)->size(), files.size() + 1);
+    EXPECT_THAT(check().problems, IsEmpty());
+    EXPECT_EQ(check().head.number, head + 2);
+  }
+}
+
 TEST_F(AuditLogTest, GoesOnInTheNextFileAndRemovesTheOldest) {
   {
     const auto log = open(1000, 3);
