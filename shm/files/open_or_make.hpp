@@ -18,8 +18,8 @@ enum class Replaces : std::uint8_t {
 /// `open()`: not_found if there is none. `make(bool replace)`: gives the name last; already_exists if it is
 /// taken and may not be replaced.
 /// Not for a memory of the pool (ObjectPool::create_memory_into): under the pool's mutex one process makes
-/// it, and each attempt would allocate all of its bytes. The headers for firmware in C have three lines of their
-/// own, since they link nothing: plc_process_image.h, plc_reference_clock.h.
+/// it, and each attempt would allocate all of its bytes. The headers for firmware in C have three lines of
+/// their own, since they link nothing: plc_process_image.h, plc_reference_clock.h.
 template <class Open, class Make>
 [[nodiscard]] auto open_or_make(const Open& open, const Make& make, Replaces replaces) -> decltype(open()) {
   constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between

@@ -161,7 +161,7 @@ TEST(ModbusNoise, AFrameBeginsBehindASilenceOfTheLine) {
   EXPECT_EQ(early, 0);
 }
 
-// It answers nothing but what it knows: two registers from 100 on.
+// It answers one request only: for two registers from 100 on.
 TEST(ModbusNoise, ADeviceThatIgnoresOtherReadsNeedsNoProbes) {
   Plant plant;
   const SerialLine line;
