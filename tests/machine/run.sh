@@ -30,20 +30,25 @@ work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-machine.XXXXXX")
 log=$work/log
 applications=$work/applications
 machine=
+told=
 clean_up() {
+  local code=$?
+  # A command has failed that no line asks about.
+  [ "$code" -eq 0 ] || [ -n "$told" ] || echo "FAILED: exit code $code; the words of the command stand above" >&2
   [ -z "$machine" ] || { kill "$machine" && wait "$machine"; } 2>/dev/null || true
   rm -rf "$work"
 }
 trap clean_up EXIT
-trap 'exit 130' INT TERM
+trap 'told=yes; exit 130' INT TERM
 fail() {
+  told=yes
   echo "FAILED: $*" >&2
   tail -n 30 "$log" >&2
   [ ! -s "$work/console" ] || tail -n 5 "$work/console" >&2
   [ -z "$machine" ] || on_machine journalctl -q --no-pager -n 40 -u plchostd >&2 || true
   exit 1
 }
-cannot() { echo "no machine can be made here: $*; nothing was tested" >&2; exit 77; }
+cannot() { told=yes; echo "no machine can be made here: $*; nothing was tested" >&2; exit 77; }
 until_true() { # until_true SECONDS COMMAND...
   local end=$((SECONDS + $1))
   shift
