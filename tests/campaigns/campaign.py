@@ -24,7 +24,6 @@ from load import CommandPoster, DdsPoster, Ledger, PoolPoster, Witness, compare
 SKIPPED = 77
 CONTROL = 60  # s: the longest control run
 ROUNDS = 3  # of a share: a stall of the machine takes cycles after its end, too
-SETTLED = 10  # s: by then all traces of the faults are gone
 TOLD = 5  # of the worst faults
 
 
@@ -46,6 +45,7 @@ class Campaign:
     each = 1  # faults of one call of fault()
     counts_events = True  # posts and runs can be compared
     counts_traces = True
+    settled = 10  # s: by then all traces of the faults are gone
     posters_of = (DdsPoster, PoolPoster, CommandPoster)  # of the events e0, e1 and e2
 
     def __init__(self, seed):
@@ -172,7 +172,7 @@ class Campaign:
         left, words = {}, []
         if self.counts_traces:
             # Again, as each process opens and makes files for a moment.
-            end = time.monotonic() + SETTLED
+            end = time.monotonic() + self.settled
             while True:
                 left, words = left_between(before, self.host.traces())
                 if not words or time.monotonic() > end:

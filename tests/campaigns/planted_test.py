@@ -16,6 +16,7 @@ class Planted(Campaign):
     """Three planted faults."""
 
     name = "planted"
+    settled = 1
 
     def fault(self, number):
         if number == 0:
