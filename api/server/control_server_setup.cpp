@@ -88,7 +88,10 @@ void ControlServer::Parts::open_audit() {
     }
     record.from = sessions->describe(client);
   };
-  audit.emplace(options.audit_folder, describe, [fd = wake.get()] { raise_event(fd); });
+  const auto recorded = [this](const dds::Guid& source, std::uint64_t accepted) {
+    intake->note_recorded(source, accepted);
+  };
+  audit.emplace(options.audit_folder, describe, [fd = wake.get()] { raise_event(fd); }, recorded);
   intake->note_sources_since(MonotonicClock::now() - 2 * RequestAudit::kPostPeriod);
 }
 

@@ -55,8 +55,9 @@ std::string argument_of(const plc_Request& request) {
 
 }  // namespace
 
-RequestAudit::RequestAudit(std::string folder, Describe describe, std::function<void()> on_written)
-    : describe_(std::move(describe)) {
+RequestAudit::RequestAudit(std::string folder, Describe describe, std::function<void()> on_written,
+                           Recorded on_recorded)
+    : describe_(std::move(describe)), on_recorded_(std::move(on_recorded)) {
   if (folder.empty()) return;
   const auto open = [folder = std::move(folder)] {
     auto logs = AuditLogs::open(folder);
@@ -195,7 +196,10 @@ void RequestAudit::posted(const plc_EventAck& ack, TimePoint now) {
 void RequestAudit::tick(TimePoint now) {
   if (!writer_) return;
   constexpr Duration kForgotten = 2 * kPostPeriod;
-  for (auto& [source, posts] : posts_) tell(source, posts, now);
+  for (auto& [source, posts] : posts_) {
+    note_recorded(source, posts);
+    tell(source, posts, now);
+  }
   std::erase_if(posts_, [&](const auto& one) { return now - one.second.last > kForgotten; });
   for (auto& [client, refusals] : refusals_) tell_refused(refusals, now);
   std::erase_if(refusals_, [&](const auto& one) {
@@ -222,7 +226,7 @@ void RequestAudit::tell(const dds::Guid& source, Posts& posts, TimePoint now) {
     AuditRecord record = record_of(source, posts);
     record.result = to_string(ErrorCode::ok);
     record.argument = names_of(posts.events);
-    (void)writer_->write(std::move(record));
+    posts.ticket = writer_->write(std::move(record));
     posts.accepted_told = posts.accepted;
     posts.events = {};
     if (now != TimePoint::max()) posts.next_accepted = now + kPostPeriod;
@@ -235,6 +239,12 @@ void RequestAudit::tell(const dds::Guid& source, Posts& posts, TimePoint now) {
     posts.rejected_told = posts.rejected;
     if (now != TimePoint::max()) posts.next_rejected = now + kRefusedPeriod;
   }
+}
+
+void RequestAudit::note_recorded(const dds::Guid& source, Posts& posts) const {
+  if (!on_recorded_ || posts.accepted_recorded == posts.accepted_told || !is_written(posts.ticket)) return;
+  posts.accepted_recorded = posts.accepted_told;
+  on_recorded_(source, posts.accepted_recorded);
 }
 
 bool RequestAudit::is_written(AuditWriter::Ticket ticket) const noexcept {

@@ -32,13 +32,17 @@ class RequestAudit {
   /// The identity of a client, for the record's `who` and `from`. By its participant.
   using Describe = std::function<void(const dds::Guid& client, AuditRecord& record)>;
 
+  /// So many accepted posts of the source are on the disk.
+  using Recorded = std::function<void(const dds::Guid& source, std::uint64_t accepted)>;
+
   /// Of more clients that are refused at a time, the requests are told together.
   static constexpr std::size_t kMostRefused = 256;
 
   /// `folder`: see AuditLogs; empty: nothing is recorded. It is opened on the thread that writes it, so this
   /// never waits for the disk. Requests that a killed server has left under way are told first. `on_written`:
-  /// see AuditWriter.
-  RequestAudit(std::string folder, Describe describe, std::function<void()> on_written = {});
+  /// see AuditWriter. `on_recorded`: by tick().
+  RequestAudit(std::string folder, Describe describe, std::function<void()> on_written = {},
+               Recorded on_recorded = {});
   /// Writes what is not yet told of posts.
   ~RequestAudit();
   RequestAudit(const RequestAudit&) = delete;
@@ -74,6 +78,8 @@ class RequestAudit {
     std::uint64_t rejected = 0;
     std::uint64_t accepted_told = 0;
     std::uint64_t rejected_told = 0;
+    std::uint64_t accepted_recorded = 0;
+    AuditWriter::Ticket ticket = 0;  // of the record that has `accepted_told`
     std::string rejected_text;
     PostedEvents::Posts events;  // not told yet
     TimePoint next_accepted{};
@@ -98,10 +104,12 @@ class RequestAudit {
   void refuse(const dds::Guid& client, AuditRecord record, TimePoint now);
   static void tell_of_unanswered(AuditLogs& logs);
   void tell(const dds::Guid& source, Posts& posts, TimePoint now);
+  void note_recorded(const dds::Guid& source, Posts& posts) const;
   void tell_refused(Refusals& refusals, TimePoint now);
 
   std::unique_ptr<AuditWriter> writer_;  // null: nothing is recorded
   Describe describe_;
+  Recorded on_recorded_;
   std::map<std::string, UnderWay> under_way_;  // by identity
   Sources posts_;
   std::unordered_map<dds::Guid, Refusals, dds::GuidHash> refusals_;  // by client

@@ -108,6 +108,11 @@ void PostLedger::set(LedgerEntry& entry, const SourceState& state) noexcept {
   entry.kept.set(state);
 }
 
+void PostLedger::set_audited(const dds::Guid& source, std::uint64_t accepted) noexcept {
+  const auto known = index_.find(source);
+  if (known != index_.end()) entries()[known->second].audited = static_cast<std::uint32_t>(accepted);
+}
+
 PostIntent& PostLedger::intent() const noexcept {
   return layout_of(memory_).intent;
 }

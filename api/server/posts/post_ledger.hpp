@@ -22,6 +22,7 @@ namespace plchost {
 struct LedgerEntry {
   std::array<std::uint8_t, 16> source{};
   std::atomic<std::uint32_t> in_use{0};  ///< written last
+  std::uint32_t audited = 0;             ///< so many accepted posts are in the audit log, modulo 2^32
   std::int64_t used_ns = 0;  ///< CLOCK_MONOTONIC of the last post: the oldest entry is given away first
   KeptState kept;
   FixedText<255> rejected_text;
@@ -67,6 +68,9 @@ class PostLedger {
 
   /// The same, of a source that is known; null: it is not.
   [[nodiscard]] const LedgerEntry* find(const dds::Guid& source) const;
+
+  /// So many accepted posts of the source are in the audit log. Does nothing for one that is not known.
+  void set_audited(const dds::Guid& source, std::uint64_t accepted) noexcept;
 
   /// This is the record of the source from now on. The entry is one of this ledger.
   void set(LedgerEntry& entry, const SourceState& state) noexcept;

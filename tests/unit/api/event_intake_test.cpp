@@ -334,6 +334,26 @@ TEST_F(EventIntakeTest, TellsTheNextServersLogOfWhoPostedLast) {
   EXPECT_EQ(acks[0].accepted, 1U);
 }
 
+TEST_F(EventIntakeTest, TellsTheNextServersLogNothingThatIsInIt) {
+  {
+    EventIntake killed = make();
+    killed.process(make_post(1));
+    killed.process(make_post(2));
+    killed.note_recorded(dds::Guid::from(make_post(1).source), 2);
+  }
+  {
+    EventIntake next = make();
+    next.note_sources_since(MonotonicClock::now() - std::chrono::minutes(1));
+    EXPECT_TRUE(next.collect_written_acks().empty());
+    next.process(make_post(3));
+  }
+  EventIntake sut = make();
+  sut.note_sources_since(MonotonicClock::now() - std::chrono::minutes(1));
+  const auto acks = sut.collect_written_acks();
+  ASSERT_EQ(acks.size(), 1U);
+  EXPECT_EQ(acks[0].accepted, 3U);
+}
+
 TEST_F(EventIntakeTest, NotesThePostsWhoseRunsAreAwaited) {
   EventIntake sut = make();
   sut.process(make_post(1));

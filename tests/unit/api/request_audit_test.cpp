@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -27,9 +28,10 @@ class RequestAuditTest : public testing::Test {
   }
   ~RequestAuditTest() override { std::filesystem::remove_all(folder_); }
 
-  [[nodiscard]] std::unique_ptr<RequestAudit> make() const {
+  [[nodiscard]] std::unique_ptr<RequestAudit> make(const RequestAudit::Recorded& recorded = {}) const {
     return std::make_unique<RequestAudit>(
-        folder_, [](const dds::Guid& client, AuditRecord& record) { record.from = client.hex(); });
+        folder_, [](const dds::Guid& client, AuditRecord& record) { record.from = client.hex(); }, [] {},
+        recorded);
   }
   [[nodiscard]] static std::string contents(const std::string& folder) {
     std::ifstream file(folder + "/audit.0000000001.log");
@@ -116,6 +118,27 @@ TEST_F(RequestAuditTest, PostsOfASourceAreToldAtItsFirstAndThenOnceInAPeriod) {
   sut->tick(start + RequestAudit::kPostPeriod);
   sut->flush();
   EXPECT_THAT(records(), HasSubstr("7 taken and 0 refused"));
+}
+
+TEST_F(RequestAuditTest, PostsThatAreOnTheDiskAreSaidToBeSoOnce) {
+  std::vector<std::uint64_t> said;
+  const auto sut = make([&](const dds::Guid& source, std::uint64_t accepted) {
+    EXPECT_EQ(source, client(1));
+    said.push_back(accepted);
+  });
+  plc_EventAck ack{};
+  client(1).copy_to(ack.source);
+  ack.accepted = 5;
+  sut->posted(ack, kNow);
+  sut->tick(kNow);
+  sut->flush();
+  sut->tick(kNow);
+  sut->tick(kNow);
+  EXPECT_THAT(said, testing::ElementsAre(5));
+  ack.accepted = 7;
+  sut->posted(ack, kNow);
+  sut->tick(kNow);
+  EXPECT_THAT(said, testing::ElementsAre(5)) << "not told yet";
 }
 
 TEST_F(RequestAuditTest, PostsNameTheirEvents) {
