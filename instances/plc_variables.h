@@ -103,8 +103,8 @@ void CDECL plc_apply_forces(void);
 /* The macros declare a variable that any task may use. The log says why one is refused. */
 #define PLC_DECLARE_VARIABLE_(name, type, address, bytes, dimensions, first, count, stride) \
   do {                                                                                      \
-    Plc_Variable plc_declared_ = {                                                          \
-        sizeof(Plc_Variable), 0, 0, 0, 0, 0, 0, {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, 0, 0};   \
+    static Plc_Variable plc_declared_; /* all else is zero */                               \
+    plc_declared_.dwSize = sizeof(Plc_Variable);                                            \
     plc_declared_.pszName = (name);                                                         \
     plc_declared_.dwType = (type);                                                          \
     plc_declared_.pAddress = (address);                                                     \
