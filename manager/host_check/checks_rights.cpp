@@ -153,7 +153,7 @@ HostFinding instance_limits(const CheckedHost& host) {
       "groups by [host] instance_groups; boot without cgroup_disable=memory";
   const auto lacks = [&](std::string_view controller) {
     const auto& missing = host.groups.missing;
-    return !host.groups.problem.empty() || host.groups.folder.empty() ||
+    return !host.groups.problem.empty() ||
            std::ranges::any_of(missing, [&](const auto& one) { return one.first == controller; });
   };
   std::string found = host.groups.problem.empty() ? host.groups.folder : "none: " + host.groups.problem;

@@ -24,7 +24,7 @@ struct CheckedHost {
   /// The control groups of the instances.
   struct Groups {
     std::string folder;
-    std::string problem;                                       ///< why there are none; empty: there are
+    std::string problem = "they were not looked for";          ///< why there are none; empty: there are
     std::vector<std::pair<std::string, std::string>> missing;  ///< controllers, and why
   };
   HostFiles files;
