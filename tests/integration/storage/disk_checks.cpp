@@ -4,6 +4,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string_view>
 #include <utility>
 
@@ -181,6 +182,23 @@ void DiskChecks::look_at_log(const CutDisk& disk, const std::string& folder) {
   std::erase_if(on_disk_, [&](const auto& each) {
     return each.first == folder || each.first.starts_with(folder + "/");
   });
+}
+
+std::vector<std::string> unrecorded(const DiskModel& model, const std::string& top) {
+  FileTree known = model.live(model.changes());
+  std::vector<std::string> wrong;
+  for (const auto& entry : fs::recursive_directory_iterator(top)) {
+    const std::string path = entry.path();
+    const auto found = known.extract(path);
+    const bool is_file = !entry.is_directory();
+    std::ifstream file(path, std::ios::binary);
+    const std::string contents =
+        is_file ? std::string(std::istreambuf_iterator<char>(file), {}) : std::string();
+    const bool same = found && (found.mapped() != nullptr) == is_file;
+    if (!same || (is_file && *found.mapped() != contents)) wrong.push_back(path);
+  }
+  for (const auto& [path, contents] : known) wrong.push_back(path);
+  return wrong;
 }
 
 }  // namespace plchost

@@ -48,4 +48,7 @@ class DiskChecks {
   std::size_t states_ = 0;
 };
 
+/// The paths below `top` that are not as the recording says: it misses a change. Empty: there are none.
+[[nodiscard]] std::vector<std::string> unrecorded(const DiskModel& model, const std::string& top);
+
 }  // namespace plchost

@@ -1,5 +1,6 @@
 // Ways to write a file that a power cut breaks: each of them is found, and the right one is not.
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 

@@ -25,6 +25,10 @@ Result<DiskModel> model_of(const std::string& recording, const std::string& top)
 }
 
 int check(const DiskModel& model, const std::string& top, const std::string& folder) {
+  for (const std::string& path : unrecorded(model, top)) {
+    fmt::print(stderr, "{}: it is not as the recording says\n", path);
+    return 1;
+  }
   DiskChecks checks(model, top, folder);
   for (const FileSystem file_system : {FileSystem::ordered, FileSystem::weak}) {
     const std::size_t before = checks.states();
