@@ -182,7 +182,7 @@ TEST_F(DapSessionTest, TellsWhyAnOwnVariableIsNotRead) {
 TEST_F(DapSessionTest, AFrameOfAFunctionHasItsLocalVariables) {
   constexpr int kFunction = kInnermost + 1;
   const json scopes = ask("scopes", {{"frameId", kFunction}})["scopes"];
-  ASSERT_EQ(scopes.size(), 1U);
+  ASSERT_EQ(scopes.size(), 2U) << "those and the globals";
   EXPECT_EQ(scopes[0]["name"], "Locals");
   const int reference = scopes[0]["variablesReference"];
   EXPECT_THAT(shown(reference), ElementsAre("n=3"));
@@ -201,7 +201,7 @@ TEST_F(DapSessionTest, LocalVariablesThatAreNotToldMeanNoOthers) {
   instance_.tasks[0]["stack"][0]["locals_left_out"] = true;
   (void)ask("stackTrace", {{"threadId", 1}});
   const json scopes = ask("scopes", {{"frameId", kInnermost}})["scopes"];
-  ASSERT_EQ(scopes.size(), 2U);
+  ASSERT_EQ(scopes.size(), 3U);
   const auto fails = [&](const std::string& command, const json& arguments) {
     return !answer(command, arguments)["success"].get<bool>();
   };
