@@ -187,15 +187,15 @@ FUNCTION_BLOCK Pump
   turns := turns + 1;
 END_FUNCTION_BLOCK
 PROGRAM Main
-  VAR_EXTERNAL count : CTU; pump : Pump; END_VAR
+  VAR_EXTERNAL count : CTU; pump1 : Pump; END_VAR
   VAR flank : BOOL; {attribute 'hide'} step1 : INT; END_VAR
   flank := NOT flank;
   count(CU := flank, PV := 30000);
-  pump();
+  pump1();
 END_PROGRAM
 CONFIGURATION cell
   VAR_GLOBAL RETAIN count : CTU; END_VAR
-  VAR_GLOBAL pump : Pump; END_VAR
+  VAR_GLOBAL pump1 : Pump; END_VAR
   RESOURCE press ON PLC
     TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
     PROGRAM one WITH fast : Main;
@@ -205,15 +205,14 @@ END_CONFIGURATION
 
 TEST_P(VariablesOfBlocks, ThatAreGlobalAreRetainedAndGoOnInAnOnlineChange) {
   std::string text = kBlocks;
-  EXPECT_THAT(build(text, sandbox.folder() + "/shown.so"), HasSubstr("{attribute 'hide'} has no effect"));
   start(text);
   ValueClient client(sandbox);
   EXPECT_EQ(client.table().symbols()[client.table().find("count.CV")->symbol].area, "retain");
-  EXPECT_EQ(client.table().symbols()[client.table().find("pump.turns")->symbol].area, "");
+  EXPECT_EQ(client.table().symbols()[client.table().find("pump1.turns")->symbol].area, "");
   EXPECT_EQ(sut->ask(ControlVerb::write_variable, "count.CV=1000").code, ErrorCode::ok);
-  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "pump.turns=1000000").code, ErrorCode::ok);
+  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "pump1.turns=1000000").code, ErrorCode::ok);
   text.replace(text.find("step1"), 5, "step1, step2");
-  (void)build(text, sandbox.folder() + "/next.so");
+  const std::string said = build(text, sandbox.folder() + "/next.so");
   const ControlReply reply = sut->ask(ControlVerb::change_application, sandbox.folder() + "/next.so");
   ASSERT_EQ(reply.code, ErrorCode::ok) << reply.text;
   EXPECT_TRUE(eventually([&] {
@@ -221,7 +220,8 @@ TEST_P(VariablesOfBlocks, ThatAreGlobalAreRetainedAndGoOnInAnOnlineChange) {
     return client.read("one.step2") == "0";
   }));
   EXPECT_GT(std::stoi(client.read("count.CV")), 999);
-  EXPECT_GT(std::stoi(client.read("pump.turns")), 999999);
+  EXPECT_GT(std::stoi(client.read("pump1.turns")), 999999);
+  EXPECT_THAT(said, HasSubstr("{attribute 'hide'} has no effect"));
 }
 
 TEST_P(VariablesOfBlocks, OfTheLibraryAreAllKnown) {

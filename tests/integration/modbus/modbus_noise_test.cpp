@@ -161,7 +161,7 @@ TEST(ModbusNoise, AFrameBeginsBehindASilenceOfTheLine) {
   EXPECT_EQ(early, 0);
 }
 
-// It answers one request only: for two registers from 100 on.
+// It answers only reads of the two registers from 100 on.
 TEST(ModbusNoise, ADeviceThatIgnoresOtherReadsNeedsNoProbes) {
   Plant plant;
   const SerialLine line;
