@@ -57,8 +57,8 @@ class EventIntake {
         directory_(pool),
         ledger_(std::move(ledger)) {}
 
-  /// The sources that posted since then, and whose posts are not all in the records, are among the next
-  /// collect_written_acks(): a server that was killed may not have told of their last posts.
+  /// The sources that posted since then are among the next collect_written_acks(): a server that was killed
+  /// may not have told of their last posts. Those whose posts are all in the records are not.
   void note_sources_since(TimePoint then);
   /// So many accepted posts of the source are in the records.
   void note_recorded(const dds::Guid& source, std::uint64_t accepted);
