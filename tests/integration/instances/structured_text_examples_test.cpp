@@ -210,7 +210,7 @@ TEST_P(StructuredTextExample, AProjectOfPlcopenThatIsWrongIsToldByItsPouAndLine)
 }
 
 INSTANTIATE_TEST_SUITE_P(By, StructuredTextExample, ::testing::Values("matiec", "strucpp"),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& compiler) { return compiler.param; });
 
 }  // namespace
 }  // namespace plchost::testing
