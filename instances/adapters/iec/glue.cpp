@@ -277,14 +277,17 @@ void GlueWriter::write_programs() {
   std::size_t count = 0;
   for (const PlannedTask& task : plan_.tasks) {
     for (const Program* const program : task.programs) {
-      if (program->name.size() > kMaxVariableName || program->type.size() >= kMaxVariableBytes) {
+      const Pou* const pou = project_.pou(program->type);  // has its name as in the source
+      const std::string& type = pou == nullptr ? program->type : pou->name;
+      if (program->name.size() > kMaxVariableName || type.size() >= kMaxVariableBytes) {
         plan_.remarks.push_back(
-            {program->place, fmt::format("an export of the plant does not have the program "
-                                         "{}: its name or that of its type is too long",
-                                         program->name)});
+            {program->place,
+             fmt::format("an export of the plant does not have the program {}: its name or that "
+                         "of its type is too long",
+                         program->name)});
         continue;
       }
-      rows += fmt::format("  {{\"{}\", \"{}\", \"{}\"}},\n", program->name, program->type, task.name);
+      rows += fmt::format("  {{\"{}\", \"{}\", \"{}\"}},\n", program->name, type, task.name);
       ++count;
     }
   }

@@ -105,6 +105,9 @@ TEST_P(VariablesOfTranslatedText, AreSeenWrittenAndForcedFromOutside) {
   EXPECT_EQ(symbol("one.pumps.hours").area, "retain");
   EXPECT_EQ(symbol("one.steps[3]").area, "retain");
   EXPECT_EQ(symbol("one.rate").area, "");
+  EXPECT_EQ(symbol("one").area, "program");
+  EXPECT_EQ(symbol("one").task, "fast");
+  EXPECT_EQ(client.read("one"), "'Main'");
   EXPECT_EQ(write("one.rate=21").code, ErrorCode::ok);
   EXPECT_TRUE(soon("one.twice", "42"));
   EXPECT_TRUE(soon("one.p.tags[2]", "42"));
