@@ -64,7 +64,7 @@ else
     done
   done
 fi
-if [ "${compilers[0]:-}" = matiec ]; then
+if [ ${#compilers[@]} -gt 0 ]; then
   echo "- programs and located variables of Structured Text"
   file_has 'names(".//resource[@name=\"line3\"]//pouInstance")' "halt1 product1 conveyor1"
   file_has 'names(".//resource[@name=\"line3\"]//pouInstance", "typeName")' "Halt Product Conveyor"
