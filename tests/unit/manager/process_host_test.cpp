@@ -97,7 +97,9 @@ class ProcessHostWithGroups : public ProcessHostTest {
 
 TEST_F(ProcessHostWithGroups, EndsWhatAProcessHasLeftInItsGroup) {
   const std::string group = control_group_name(pool_, "line1");
-  run_in_group("setsid sleep 1000 >/dev/null 2>&1 & exit 0");
+  const std::string left = folder_ / "left";
+  run_in_group("setsid sh -c 'echo >" + left + "; exec sleep 1000' >/dev/null 2>&1 &\nwhile [ ! -e " + left +
+               " ]; do sleep 0.01; done");
   EXPECT_TRUE(end_.success()) << end_.describe();
   EXPECT_TRUE(folder_of_groups_.comes_to(group, 0));
 }
@@ -118,7 +120,12 @@ TEST_F(ProcessHostWithGroups, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
       encode(SetupReport{SetupStep::attach_pool, ErrorCode::already_exists, "x", false});
   run_in_group("printf '%s' '" + taken + "' >&3\nexit 3");
   EXPECT_TRUE(end_.exited_with(3));
-  EXPECT_EQ(folder_of_groups_.processes(group), 1);
+  pid_t ended = 0;
+  for (int i = 0; i < 30 && ended == 0; ++i) {
+    ::usleep(10'000);
+    ended = ::waitpid(holder, nullptr, WNOHANG);
+  }
+  EXPECT_EQ(ended, 0) << "it runs on";
   ::kill(holder, SIGKILL);
   ::waitpid(holder, nullptr, 0);
   run_in_group("exit 0");
