@@ -60,7 +60,7 @@ TEST_F(ReplaceFile, FoldersAreMadeWithTheirRightsAndThoseThatAreThereStayAsTheyA
   const auto without_parent = make_synced_folder(directory + "/d/e", 0700);
   ASSERT_FALSE(without_parent);
   EXPECT_EQ(without_parent.error().describe(),
-            "cannot create folder " + directory + "/d/e: No such file or directory");
+            "cannot create folder " + directory + "/d/e: No such file or directory (ENOENT)");
 }
 
 }  // namespace

@@ -161,7 +161,10 @@ TEST(SystemCallFilter, FailsBesideAThreadWithAFilterOfItsOwn) {
 
 TEST(SystemCallFilter, SaysThatTheKernelHasNone) {
   constexpr std::array kSeccomp = {RefusedCall{SYS_seccomp, "seccomp", 0, EINVAL}};
-  EXPECT_EQ(in_a_child([&] { return refuse(kSeccomp) + refuse(kGroup); }),
+  EXPECT_EQ(in_a_child([&] {
+              const std::string wrong = refuse(kSeccomp);
+              return wrong + refuse(kGroup);
+            }),
             "cannot set a filter of system calls (seccomp): Invalid argument (EINVAL)");
 }
 

@@ -47,7 +47,11 @@ std::string allowed_of(std::span<const RefusedCall> calls) {
 }
 
 TEST(Sandbox, OfTheFirstStageRefusesEachCallOfItsTable) {
-  EXPECT_EQ(in_a_child([] { return confine(Seccomp::no_exec) + allowed_of(calls_refused_to_load()); }), "");
+  EXPECT_EQ(in_a_child([] {
+              const std::string wrong = confine(Seccomp::no_exec);
+              return wrong + allowed_of(calls_refused_to_load());
+            }),
+            "");
 }
 
 TEST(Sandbox, OfTheSecondStageRefusesNewSocketsToo) {
