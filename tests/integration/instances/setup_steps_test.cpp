@@ -46,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         Case{"UnknownOption", {"--shceduler", "x"}, 2, "--shceduler"},
         Case{"UnknownScheduler", {"--scheduler", "CmpShedule"}, 2, "CmpScheduleOneShot"},
-        Case{"UnknownBand", {"--priority-band", "higher"}, 2, "high, normal and low"},
+        Case{"UnknownBand", {"--priority-band", "higher"}, 2, "high, normal, low"},
         Case{"BadName", {"--name", "a b"}, 2, "instance name"},
         Case{"BadLogLevel", {"--log-level", "loud"}, 2, "trace, debug"},
         Case{"CoreThatIsNotThere", {"--core", "1000"}, 3, "bind core failed"},
