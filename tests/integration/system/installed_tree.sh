@@ -31,7 +31,7 @@ for unit in "$prefix"/lib/systemd/system/*.service; do
   program=$(sed -n 's/^ExecStart=\([^ ]*\).*/\1/p' "$unit")
   case $(basename "$unit") in
     plchostd.service) is "$program" "$prefix/bin/plchostd" ;;
-    plchost-instances.service) is "$program" /bin/true ;;
+    plchost-instances.service) is "$program" /bin/sh ;;
     *) is "$program" "$prefix/bin/$(basename "$unit" @.service)" && [ -x "$program" ] ;;
   esac || fail "$unit starts $program"
   for document in $(grep -oE 'file:[^ ]+' "$unit" | cut -d: -f2); do [ -f "$document" ] || fail "no $document"; done
