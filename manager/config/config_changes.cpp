@@ -53,7 +53,7 @@ std::string_view describe(TakesEffect when) noexcept {
     case next_start:
       return "used when the host starts the next time; until then start and stop decide";
     case next_manager:
-      return "used when plchostd is restarted, which ends the instances";
+      return "used when plchostd is stopped, which ends the instances, and started";
   }
   return "";
 }

@@ -105,8 +105,8 @@ inline constexpr std::int64_t kMinMemoryMib = 16;
 inline constexpr std::int64_t kMaxMemoryMib = 1'048'576;
 inline constexpr std::int64_t kMinPids = 16;
 inline constexpr std::int64_t kMaxPids = 100'000;
-/// The kernel never ends a process with -1000: at its own limit of memory that would stand still.
-inline constexpr std::int64_t kMinOomScore = -999;
+/// The unit allows no lower one.
+inline constexpr std::int64_t kMinOomScore = kInstanceOomScore;
 inline constexpr std::int64_t kMaxOomScore = 1000;
 inline constexpr std::size_t kMaxPeers = 32;
 inline constexpr std::int64_t kMaxRestartDelayMs = 3'600'000;

@@ -10,8 +10,10 @@
 #include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 
@@ -33,7 +35,6 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   LaunchOptions launch = options;
   launch.control_group = make_group(share.limits);
   launch.oom_score = share.oom_score;
-  found_name_held_ = false;
   PLCHOST_TRY_ASSIGN(auto process, spawn_process({.arguments = to_arguments(settings_.program, launch),
                                                   .report_fd = channel.childs.get(),
                                                   .output_fd = output ? output->get() : -1}));
@@ -55,7 +56,9 @@ std::string ProcessHost::group_name() const {
 }
 
 bool ProcessHost::name_is_held() const {
-  return user_that_holds(instance_claim_path(settings_.run_directory, settings_.name)).has_value();
+  // The other one also tells of a process with another run directory.
+  return user_that_holds(instance_claim_path(settings_.run_directory, settings_.name)).has_value() ||
+         user_that_holds(MemoryFile::path(instance_claim_name(settings_.pool, settings_.name))).has_value();
 }
 
 // A process that ended while no manager ran may have left others in the group.
@@ -150,7 +153,6 @@ void ProcessHost::read_reports() {
   read_output();
   take_packets(report_, report_watch_, [this](std::string_view packet) {
     if (const auto report = decode_report(packet)) {
-      found_name_held_ = found_name_held_ || report->code == ErrorCode::already_exists;
       events_->on_report(*report);
     } else {
       spdlog::warn("instance {}: {}", settings_.name, report.error().describe());
@@ -170,8 +172,8 @@ void ProcessHost::read_replies() {
 
 // All that is left in it. Whether the kernel has ended a process there for want of memory.
 bool ProcessHost::end_group() {
-  // One that found its name held was put into the group of the process that has it.
-  if (settings_.groups == nullptr || (found_name_held_ && name_is_held())) return false;
+  // The process that ended may have been put into the group of another one that has the name.
+  if (settings_.groups == nullptr || name_is_held()) return false;
   const bool out_of_memory = settings_.groups->was_out_of_memory(group_name());
   settings_.groups->end(group_name());
   return out_of_memory;

@@ -85,7 +85,6 @@ class ProcessHost : public InstanceHost {
   Reactor::Timer timer_;
 
   std::optional<ChildProcess> process_;
-  bool found_name_held_ = false;  // by its own report: another process has the name
   Reactor::Watch exit_watch_;
   PacketSocket report_;
   Reactor::Watch report_watch_;

@@ -85,6 +85,8 @@ RequestAudit::~RequestAudit() {
   if (!writer_) return;
   for (auto& [source, posts] : posts_) tell(source, posts, TimePoint::max());
   for (auto& [client, refusals] : refusals_) tell_refused(refusals, TimePoint::max());
+  writer_->flush();
+  note_recorded(MonotonicClock::now());
 }
 
 void RequestAudit::asked(const dds::Guid& client, const plc_Request& request) {
@@ -196,10 +198,8 @@ void RequestAudit::posted(const plc_EventAck& ack, TimePoint now) {
 void RequestAudit::tick(TimePoint now) {
   if (!writer_) return;
   constexpr Duration kForgotten = 2 * kPostPeriod;
-  for (auto& [source, posts] : posts_) {
-    note_recorded(source, posts);
-    tell(source, posts, now);
-  }
+  note_recorded(now);
+  for (auto& [source, posts] : posts_) tell(source, posts, now);
   std::erase_if(posts_, [&](const auto& one) { return now - one.second.last > kForgotten; });
   for (auto& [client, refusals] : refusals_) tell_refused(refusals, now);
   std::erase_if(refusals_, [&](const auto& one) {
@@ -241,10 +241,14 @@ void RequestAudit::tell(const dds::Guid& source, Posts& posts, TimePoint now) {
   }
 }
 
-void RequestAudit::note_recorded(const dds::Guid& source, Posts& posts) const {
-  if (!on_recorded_ || posts.accepted_recorded == posts.accepted_told || !is_written(posts.ticket)) return;
-  posts.accepted_recorded = posts.accepted_told;
-  on_recorded_(source, posts.accepted_recorded);
+// A record is written also if the disk refused it: then the next server tells the posts once more.
+void RequestAudit::note_recorded(TimePoint now) {
+  if (!on_recorded_ || !writer_->problem(now).empty()) return;
+  for (auto& [source, posts] : posts_) {
+    if (posts.ticket == 0 || !is_written(posts.ticket)) continue;
+    posts.ticket = 0;
+    on_recorded_(source, posts.accepted_told);
+  }
 }
 
 bool RequestAudit::is_written(AuditWriter::Ticket ticket) const noexcept {

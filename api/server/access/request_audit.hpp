@@ -78,8 +78,7 @@ class RequestAudit {
     std::uint64_t rejected = 0;
     std::uint64_t accepted_told = 0;
     std::uint64_t rejected_told = 0;
-    std::uint64_t accepted_recorded = 0;
-    AuditWriter::Ticket ticket = 0;  // of the record that has `accepted_told`
+    AuditWriter::Ticket ticket = 0;  // of the record that has `accepted_told`; 0: it is noted
     std::string rejected_text;
     PostedEvents::Posts events;  // not told yet
     TimePoint next_accepted{};
@@ -104,7 +103,7 @@ class RequestAudit {
   void refuse(const dds::Guid& client, AuditRecord record, TimePoint now);
   static void tell_of_unanswered(AuditLogs& logs);
   void tell(const dds::Guid& source, Posts& posts, TimePoint now);
-  void note_recorded(const dds::Guid& source, Posts& posts) const;
+  void note_recorded(TimePoint now);
   void tell_refused(Refusals& refusals, TimePoint now);
 
   std::unique_ptr<AuditWriter> writer_;  // null: nothing is recorded

@@ -53,9 +53,7 @@ bool EventIntake::take_batches(dds_entity_t reader) {
 void EventIntake::note_sources_since(TimePoint then) {
   const std::lock_guard lock(mutex_);
   ledger_.for_each([&](const LedgerEntry& entry) {
-    const PostCounters& counters = entry.state().counters;
-    const bool is_told =
-        entry.audited == static_cast<std::uint32_t>(counters.accepted) && counters.rejected == 0;
+    const bool is_told = entry.audited == static_cast<std::uint32_t>(entry.state().counters.accepted);
     if (!is_told && entry.used_ns >= then.time_since_epoch().count())
       written_.insert(dds::Guid{entry.source});
   });

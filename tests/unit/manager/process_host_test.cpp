@@ -10,6 +10,8 @@
 #include <unistd.h>
 
 #include "shm/files/lock_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/process/dynamic_loader.hpp"
 #include "tests/support/group_folder.hpp"
@@ -93,6 +95,7 @@ class ProcessHostWithGroups : public ProcessHostTest {
   void SetUp() override {
     if (!folder_of_groups_.there()) GTEST_SKIP() << kNoGroupFolder;
   }
+  void expect_holder_runs_on(const std::string& claim);
 };
 
 TEST_F(ProcessHostWithGroups, EndsWhatAProcessHasLeftInItsGroup) {
@@ -104,14 +107,13 @@ TEST_F(ProcessHostWithGroups, EndsWhatAProcessHasLeftInItsGroup) {
   EXPECT_TRUE(folder_of_groups_.comes_to(group, 0));
 }
 
-// Else the process that has the name, and drives machines, would be ended with the one that is too many.
-TEST_F(ProcessHostWithGroups, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
+void ProcessHostWithGroups::expect_holder_runs_on(const std::string& claim) {
   const std::string group = control_group_name(pool_, "line1");
   ASSERT_TRUE(groups_.make(group, {}));
   const pid_t holder = ::fork();
   if (holder == 0) {
     std::ofstream(folder_of_groups_.path() + "/" + group + "/cgroup.procs") << 0;
-    const auto lock = LockFile::take(folder_ / "line1.claim");
+    const auto lock = LockFile::take(claim);
     if (lock) std::ofstream(folder_ / "held") << 1;
     for (;;) ::pause();
   }
@@ -131,6 +133,17 @@ TEST_F(ProcessHostWithGroups, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
   run_in_group("exit 0");
   for (int i = 0; i < 1000 && !groups_.remove_ended(); ++i) ::usleep(10'000);
   EXPECT_FALSE(folder_of_groups_.has(group));
+}
+
+// Else the process that has the name, and drives machines, would be ended with the one that is too many.
+TEST_F(ProcessHostWithGroups, EndsNobodyInTheGroupOfAProcessThatHasTheName) {
+  expect_holder_runs_on(folder_ / "line1.claim");
+}
+
+TEST_F(ProcessHostWithGroups, EndsNobodyWhoHasTheNameByAnotherRunDirectory) {
+  const std::string claim = MemoryFile::path(instance_claim_name(pool_, "line1"));
+  expect_holder_runs_on(claim);
+  ::unlink(claim.c_str());
 }
 
 TEST_F(ProcessHostTest, TellsAProcessItsOomScoreAndWithoutGroupsNoGroup) {
