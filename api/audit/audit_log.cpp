@@ -196,7 +196,9 @@ void AuditLog::tell_sync(const std::string& problem) {
     if (std::exchange(sync_problem_, problem) == problem) return;
   }
   if (problem.empty()) {
-    spdlog::info("the audit log in {} is on the disk again", options_.folder);
+    spdlog::info(
+        "the audit log in {} reaches the disk again; records of the time before may be missing there",
+        options_.folder);
   } else {
     spdlog::error("records of the audit log may not survive a loss of power: {}", problem);
   }

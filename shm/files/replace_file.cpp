@@ -1,5 +1,8 @@
 #include "shm/files/replace_file.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cerrno>
 #include <filesystem>
 
 #include <fcntl.h>
@@ -10,6 +13,16 @@
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost {
+
+namespace {
+
+// "/x/retain/" lies in "/x".
+std::string without_last_slash(const std::string& path) {
+  const std::filesystem::path folder(path);
+  return folder.has_filename() ? path : folder.parent_path().string();
+}
+
+}  // namespace
 
 Result<void> write_whole_file(const std::string& path, std::string_view text, mode_t mode) {
   // A left-over of a run before this one may have other rights.
@@ -34,19 +47,22 @@ Result<void> sync_directory(const std::string& path) {
 }
 
 Result<void> make_synced_folder(const std::string& path, mode_t mode) {
-  const std::filesystem::path above = std::filesystem::path(path).parent_path();
-  const bool made = ::mkdir(path.c_str(), mode) == 0;
-  if (!made && errno != EEXIST) return failure(ErrorCode::system, "cannot create folder " + path, errno);
+  const std::string folder = without_last_slash(path);
+  const std::filesystem::path above = std::filesystem::path(folder).parent_path();
+  const bool made = ::mkdir(folder.c_str(), mode) == 0;
+  if (!made && errno != EEXIST) return failure(ErrorCode::system, "cannot create folder " + folder, errno);
   // One that was there is synced as well: the process that made it may have been killed before it did. Not
-  // every user of a folder may read the one above it.
+  // every user of a folder may read the one above it, and some that are only read cannot be synced.
   auto synced = sync_directory(above.empty() ? "." : above.string());
-  return made || (!synced && synced.error().system_errno != EACCES) ? synced : Result<void>();
+  constexpr std::array kOfOthers = {EACCES, EINVAL, EROFS};
+  const bool tolerated =
+      !made && !synced && std::ranges::find(kOfOthers, synced.error().system_errno) != kOfOthers.end();
+  return tolerated ? Result<void>() : synced;
 }
 
 Result<void> make_synced_folders(const std::string& path, mode_t mode) {
   constexpr mode_t kModeOfOthers = 0777;
-  std::filesystem::path folder(path);
-  if (!folder.has_filename()) folder = folder.parent_path();
+  const std::filesystem::path folder(without_last_slash(path));
   const std::filesystem::path above = folder.parent_path();
   std::error_code error;
   if (!above.empty() && !std::filesystem::exists(above, error)) {

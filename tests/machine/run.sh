@@ -242,7 +242,7 @@ done
 story "each instance has a control group of its own, with its limits"
 groups=/sys/fs/cgroup/system.slice/plchost-instances.service
 process_of() { plcctl list instances --json | jq -r ".[] | select(.name == \"$1\") | .pid"; }
-limits_of_line2() { on_machine sh -c 'cd "$1" && paste -sd" " memory.max memory.oom.group pids.max' _ "$groups/plchost.instance.line2"; }
+limits_of_line2() { on_machine sh -c 'cd "$1" && cat memory.max memory.oom.group pids.max | paste -sd" "' _ "$groups/plchost.instance.line2"; }
 # in_group PROGRAM...: in the group of line2
 in_group() { on_machine sh -c 'echo 0 >"$0/cgroup.procs" && exec "$@"' "$groups/plchost.instance.line2" "$@"; }
 if on_machine test -e /sys/fs/cgroup/cgroup.controllers; then

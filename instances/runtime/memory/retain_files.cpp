@@ -39,17 +39,26 @@ std::string stem_of(const std::string& directory, const std::string& instance) {
   return fmt::format("{}/{}.retain", directory, instance);
 }
 
+Result<void> copy_and_sync(const std::string& path, const std::string& fresh) {
+  std::error_code error;
+  std::filesystem::copy_file(path, fresh, std::filesystem::copy_options::overwrite_existing, error);
+  if (error) return failure(ErrorCode::system, "cannot copy " + path + " to " + fresh, error.value());
+  const UniqueFd copy(::open(fresh.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+  if (!copy) return failure(ErrorCode::system, "cannot open " + fresh, errno);
+  PLCHOST_TRY(check_errno(::fsync(copy.get()), "cannot sync " + fresh));
+  return {};
+}
+
 // Of any size: it may be no file of ours. The copy is whole before it takes the place of the one before.
 Result<void> put_copy_aside(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return {};
   const std::string aside = path + ".old";
   const std::string fresh = aside + ".new";
-  std::filesystem::copy_file(path, fresh, std::filesystem::copy_options::overwrite_existing, error);
-  if (error) return failure(ErrorCode::system, "cannot copy " + path + " to " + fresh, error.value());
-  const UniqueFd copy(::open(fresh.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
-  if (!copy) return failure(ErrorCode::system, "cannot open " + fresh, errno);
-  PLCHOST_TRY(check_errno(::fsync(copy.get()), "cannot sync " + fresh));
+  if (auto copied = copy_and_sync(path, fresh); !copied) {
+    ::unlink(fresh.c_str());  // half a copy only takes room, of which there may be too little
+    return copied;
+  }
   if (::rename(fresh.c_str(), aside.c_str()) == 0) return {};
   return failure(ErrorCode::system, "cannot rename " + fresh, errno);
 }
@@ -127,10 +136,15 @@ Result<void> RetainFiles::write(const RetainImage& image) {
 }
 
 Result<void> RetainFiles::put_aside(std::bitset<2> which) const {
+  Result<void> done;
   for (std::uint64_t file = 0; file < 2; ++file) {
-    if (which[file]) PLCHOST_TRY(put_copy_aside(path(file)));
+    if (!which[file]) continue;
+    auto put = put_copy_aside(path(file));
+    if (!put && done) done = std::move(put);
   }
-  return which.any() ? sync_directory(directory_) : Result<void>();
+  if (!which.any()) return done;
+  auto synced = sync_directory(directory_);
+  return done ? synced : done;
 }
 
 }  // namespace plchost

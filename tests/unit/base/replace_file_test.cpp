@@ -63,5 +63,10 @@ TEST_F(ReplaceFile, FoldersAreMadeWithTheirRightsAndThoseThatAreThereStayAsTheyA
             "cannot create folder " + directory + "/d/e: No such file or directory (ENOENT)");
 }
 
+TEST_F(ReplaceFile, AFolderThatIsThereMayLieInOneThatCannotBeSynced) {
+  const auto there = make_synced_folder("/proc/self", 0700);
+  EXPECT_TRUE(there) << there.error().describe();
+}
+
 }  // namespace
 }  // namespace plchost
