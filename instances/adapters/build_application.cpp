@@ -76,15 +76,19 @@ class Build {
     }
     return context_.good();
   }
-  // *.st, also in its folders; but for hidden ones, and what an earlier build has left.
+  // *.st, also in its folders; but for hidden ones, what an earlier build has left, and folders of others.
   [[nodiscard]] static std::vector<std::string> files_in(const std::string& folder, std::error_code& error) {
     std::vector<std::string> files;
-    for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    constexpr auto kOptions = fs::directory_options::skip_permission_denied;
+    (void)fs::directory_iterator(folder, error);  // of the folder itself it is an error
+    if (error) return files;
+    for (fs::recursive_directory_iterator it(folder, kOptions, error), end; !error && it != end;
+         it.increment(error)) {
       std::error_code none;  // a link that leads nowhere is no folder
+      const bool is_hidden = it->path().filename().string().starts_with('.');
       if (it->is_directory(none)) {
-        const bool is_hidden = it->path().filename().string().starts_with('.');
         if (is_hidden || WorkFolder::is_kept(it->path())) it.disable_recursion_pending();
-      } else if (iec::folded(it->path().extension().string()) == ".ST") {
+      } else if (!is_hidden && iec::folded(it->path().extension().string()) == ".ST") {
         files.push_back(it->path());
       }
     }

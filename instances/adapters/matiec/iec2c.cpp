@@ -102,7 +102,8 @@ std::vector<iec::Token> values_of(const iec::DeclaredType& type, std::span<const
   std::vector<iec::Token> values;
   const auto source = std::ranges::find(sources, type.place.file, &iec::Source::file);
   if (source == sources.end()) return values;
-  const std::vector<iec::Token> tokens = iec::tokens_of(source->text, source->file).all;
+  std::vector<iec::Token> tokens = iec::tokens_of(source->text, source->file).all;
+  std::erase_if(tokens, [](const iec::Token& one) { return one.kind == iec::Token::Kind::pragma; });
   auto token = std::ranges::find(tokens, type.place, &iec::Token::place);
   token = std::find_if(token, tokens.end(), [](const iec::Token& one) { return one.is("("); });
   for (; token != tokens.end() && !token->is(")"); ++token) {

@@ -625,7 +625,7 @@ function hiddenOf(skipped) {
     const [form, text] = texts.find(([one]) => one.test(reason)) ?? [/^/, 'STruC++ leaves it out: '];
     found.set(pattern(path), { name: pattern(path), why: reason.replace(form, text) });
   }
-  return [...found.values()].slice(0, kMostMessages);
+  return [...found.values()];
 }
 
 // The variables of the compiler's table for debuggers, each array as one: GRID[][].X and the bounds of its indexes. An
@@ -696,6 +696,10 @@ if (result.success) {
   const { table, skipped } = await debugTable(result);
   plan.symbols = symbolsOf(table);
   plan.hidden = hiddenOf(skipped);
+  if (plan.hidden.length > kMostMessages) {
+    found.remarks.push({ place: [-1, 0, 0], text: `${plan.hidden.length} variables cannot be seen from outside, of which ${kMostMessages} are named` });
+    plan.hidden.length = kMostMessages;
+  }
   if (plan.symbols.length > kMostSymbols) {
     found.remarks.push({ place: [-1, 0, 0], text: `${plan.symbols.length} variables: those beyond ${kMostSymbols} cannot be seen from outside` });
     plan.symbols.length = kMostSymbols;

@@ -210,6 +210,7 @@ TEST_F(BuildParts, OfAFolderTheSourcesAtAnyDepthAreTaken) {
   const std::string two = put("line/two.st", "TYPE Kind : INT; END_TYPE\n");
   (void)put("line/note.txt", "no source");
   (void)put("line/.git/three.st", "hidden");
+  (void)put("line/._two.st", "hidden");
   (void)put("line/made/joined.st", "of an earlier build");
   (void)put("line/made/.plchost-build", "");
   const BuildReport report = build_application({.sources = {path("line")},
