@@ -1,5 +1,6 @@
 // The examples in ST and a project of PLCopen XML, from their sources to the process image.
 #include <array>
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -111,16 +112,21 @@ class StructuredTextExample : public ::testing::TestWithParam<std::string> {
     run(file + ".cfg", terminal);
   }
   void run(const std::string& settings, const std::string& terminal) {
-    sut.emplace(sandbox,
-                std::vector<std::string>{"--settings", settings, "--application", sandbox.folder() + "/it.so",
-                                         "--state-directory", sandbox.folder() + "/state"});
-    sut->wait_until_up();
+    run_again(settings);
     const char* const pool = sandbox.pool().c_str();
     ASSERT_EQ(plc_image_open(pool, (terminal + ".in").c_str(), kImage, PLC_IMAGE_WRITE, &inputs_), 0);
     ASSERT_EQ(plc_image_open(pool, (terminal + ".out").c_str(), kImage, PLC_IMAGE_READ, &outputs_), 0);
   }
+  /// Another process, with the same images.
+  void run_again(const std::string& settings) {
+    sut.emplace(sandbox,
+                std::vector<std::string>{"--settings", settings, "--application", sandbox.folder() + "/it.so",
+                                         "--state-directory", sandbox.folder() + "/state"});
+    sut->wait_until_up();
+  }
   void put(std::uint8_t bits, std::uint16_t word = 0, std::size_t at = 2) {
     put_in_ = {};
+    put_in_[kQuality] = quality;
     put_in_[0] = bits;
     if (at != 0) std::memcpy(&put_in_.at(at), &word, sizeof word);
     if (at == 0) std::memcpy(put_in_.data(), &word, sizeof word);
@@ -144,8 +150,10 @@ class StructuredTextExample : public ::testing::TestWithParam<std::string> {
 
   Sandbox sandbox;
   std::optional<InstanceProcess> sut;
+  std::uint8_t quality = 0;  ///< of the terminal of the packing line, in the next put()
 
  private:
+  static constexpr std::size_t kQuality = 8;
   plc_image inputs_{};
   plc_image outputs_{};
   Image put_in_{};
@@ -174,7 +182,8 @@ TEST_P(StructuredTextExample, TheTemperatureLoopReachesItsSetPoint) {
 TEST_P(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
   ASSERT_NO_FATAL_FAILURE(start("packing", "packing"));
   constexpr std::uint8_t kStop = 1, kEnable = 2, kAcknowledge = 4;
-  constexpr int kMotor = 1, kFault = 2;
+  constexpr int kMotor = 1, kFault = 2, kCartonFull = 4;
+  quality = 1;
   put(kEnable, 300);
   EXPECT_TRUE(eventually([&] {
     beat();
@@ -187,7 +196,22 @@ TEST_P(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
   EXPECT_TRUE(eventually([&] { return (outputs()[0] & (kMotor | kFault)) == kFault && word(4) == 1; }));
   EXPECT_EQ(product.post(), PostResult::posted);
   EXPECT_TRUE(eventually([&] { return word(5) == 1; })) << "refused";
-  put(kEnable, 300);
+  // The button is held while the connection breaks, and no edge.
+  const auto put_until_seen = [&](std::uint8_t bits) {
+    put(bits, 300);
+    for (int i = 0; i < 2; ++i) {  // the cycle that shows the first one may have had its inputs before
+      const int refused = word(5);
+      EXPECT_EQ(product.post(), PostResult::posted);
+      EXPECT_TRUE(eventually([&] { return word(5) == refused + 1; }));
+    }
+  };
+  put_until_seen(kEnable | kStop | kAcknowledge);
+  quality = 2;
+  put_until_seen(0);
+  quality = 1;
+  put_until_seen(kEnable | kAcknowledge);
+  EXPECT_EQ(outputs()[0] & kFault, kFault) << "it is not acknowledged";
+  put_until_seen(kEnable);
   put(kEnable | kAcknowledge, 300);
   const auto turns = [&] { return (outputs()[0] & (kMotor | kFault)) == kMotor; };
   const auto turns_with_signs = [&] {
@@ -198,6 +222,16 @@ TEST_P(StructuredTextExample, ThePackingLineCountsEachProductAndHalts) {
   EXPECT_EQ(word(2), 25);
   EXPECT_TRUE(eventually([&] { return !turns(); })) << "the firmware gives no sign any more";
   EXPECT_TRUE(eventually(turns_with_signs));
+
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+  run_again(std::string(EXAMPLES) + "/packing/packing.cfg");
+  EXPECT_EQ(sut->event("product").post(), PostResult::posted);
+  bool was_full = false;
+  EXPECT_TRUE(eventually([&] {
+    was_full = was_full || (outputs()[0] & kCartonFull) != 0;
+    return word(2) == 26 && word(3) == 2;
+  }));
+  EXPECT_FALSE(was_full || (outputs()[0] & kCartonFull) != 0) << "retained products are no new ones";
 }
 
 TEST_P(StructuredTextExample, AProjectOfPlcopenRunsAsItIsWritten) {

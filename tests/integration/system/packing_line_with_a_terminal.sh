@@ -17,7 +17,8 @@ start_line() {
   mkfifo "$cell/$host.told"
   shown=$cell/$host.shown
   "$example/terminal.py" --port 0 <"$cell/$host.told" >"$shown" 2>"$cell/terminal.log" &
-  others+=($!)
+  terminal=$!
+  others+=("$terminal")
   exec {told}>"$cell/$host.told"
   until_true 20 test -s "$shown"
 
@@ -36,7 +37,9 @@ start_modbus() {
   others+=("$modbus")
 }
 tell() { echo "$*" >&"$told"; }
-motor_is() { [ "$(asked plcctl read variable packing1 conveyor1.motor --json | jq -r ".[0].value")" = "$1" ]; }
+is() { [ "$(asked plcctl read variable packing1 "conveyor1.$1" --json | jq -r ".[0].value")" = "$2" ]; }
+stop_is() { [ "$(asked plcctl read variable packing1 emergency_stop --json | jq -r ".[0].value")" = "$1" ]; }
+motor_is() { is motor "$1"; }
 shows() { [[ $(tail -n 1 "$shown") == *"$1"* ]]; }
 
 for compiler in "${compilers[@]}"; do
@@ -59,6 +62,29 @@ for compiler in "${compilers[@]}"; do
   tell acknowledge 1
   until_true 40 shows "motor 1, fault 0, carton 0, speed 300"
 
+  echo "- a break of the connection does not acknowledge an emergency stop, though the button is held"
+  tell stop 1
+  until_true 40 shows "motor 0, fault 1, carton 0, speed 0, products 25, cartons 2, stops 2"
+  tell acknowledge 0
+  until_true 40 is acknowledge FALSE
+  tell acknowledge 1
+  until_true 40 is acknowledge TRUE
+  tell stop 0
+  until_true 40 stop_is FALSE
+  kill -STOP "$terminal"
+  until_true 40 is quality 2
+  until_true 40 is acknowledge FALSE
+  kill -CONT "$terminal"
+  until_true 40 is acknowledge TRUE
+  until_true 40 is quality 1
+  plcctl post event packing1/product
+  until_true 40 shows "refused 2"
+  shows "motor 0, fault 1" || fail "acknowledged by a break: $(tail -n 1 "$shown")"
+  tell acknowledge 0
+  until_true 40 is acknowledge FALSE
+  tell acknowledge 1
+  until_true 40 shows "motor 1, fault 0, carton 0, speed 300"
+
   echo "- plchost-modbus is killed: the motor stops, and goes on when it is started again"
   until_true 40 motor_is TRUE
   kill -KILL "$modbus"
@@ -67,6 +93,12 @@ for compiler in "${compilers[@]}"; do
   tell speed 100
   start_modbus
   until_true 40 shows "motor 1, fault 0, carton 0, speed 100"
+
+  echo "- after a restart the products of before are no new carton"
+  before=$(wc -l <"$shown")
+  plcctl restart instance packing1
+  until_true 40 shows "motor 1, fault 0, carton 0, speed 100, products 25, cartons 2"
+  tail -n "+$((before + 1))" "$shown" | grep -q "carton 1" && fail "a carton is full: $(tail -n "+$((before + 1))" "$shown")"
 
   kill "$modbus"
   wait "$modbus" || fail "plchost-modbus ends with exit code $?"
