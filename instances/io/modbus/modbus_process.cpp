@@ -22,10 +22,12 @@ using std::chrono::milliseconds;
 constexpr milliseconds kShow{50};          // how fine the ages are
 constexpr milliseconds kRepairPause{500};  // images whose file was removed
 // At first a device that answers puts its outputs into their safe state; a thread on TCP that still waits
-// then is interrupted. The devices of a serial line or of one connection take turns, which cannot be.
+// for another response then is interrupted. The devices of a serial line or of one connection take turns, and
+// outputs of many requests take their time: they go on up to kLineTime.
 constexpr milliseconds kSafeStateTime{600};
-constexpr milliseconds kInterruptTime{250};
+constexpr milliseconds kInterruptTime{700};  // for a connection and a response, of 300 ms each
 constexpr milliseconds kLineTime{10'000};
+constexpr milliseconds kStillAnswers{700};  // since a response: the next one comes before, or never
 
 // Devices with the same one take turns.
 std::string line_of(const DeviceConfig& device) {
@@ -102,6 +104,12 @@ bool ModbusProcess::join_until(TimePoint deadline) {
   return ended;
 }
 
+bool ModbusProcess::answers() const {
+  const TimePoint since = MonotonicClock::now() - kStillAnswers;
+  return std::ranges::any_of(lines_,
+                             [&](const auto& line) { return line.second->answered_at_end() > since; });
+}
+
 bool ModbusProcess::stop() {
   stop_.set();
   const TimePoint now = MonotonicClock::now();
@@ -113,9 +121,9 @@ bool ModbusProcess::stop() {
   const auto at_line = [](const DeviceConfig& device) { return !device.serial.empty(); };
   const bool take_turns =
       std::ranges::any_of(config_.devices, at_line) || lines_.size() < config_.devices.size();
-  if (!ended && take_turns) {
+  while (!ended && MonotonicClock::now() < now + kLineTime && (take_turns || answers())) {
     show(MonotonicClock::now(), true);
-    ended = join_until(now + kLineTime);
+    ended = join_until(std::min(MonotonicClock::now() + kShow, now + kLineTime));
   }
   for (const auto& device : devices_) {
     if (!ended && !device->has_ended())

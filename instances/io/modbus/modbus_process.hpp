@@ -39,6 +39,8 @@ class ModbusProcess {
   [[nodiscard]] Result<void> add_devices();
   [[nodiscard]] Result<void> start_threads();
   [[nodiscard]] bool join_until(TimePoint deadline);
+  /// A device still puts its outputs into their safe state.
+  [[nodiscard]] bool answers() const;
   /// The status and the age of each device, into all images.
   void show(TimePoint now, bool ended);
   void repair(TimePoint now);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdint>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -116,6 +117,39 @@ TEST(ModbusNoise, TheEndSetsOutputsThoughOneResponseIsGarbled) {
   EXPECT_EQ(sut.end(SIGTERM), 0);
   EXPECT_TRUE(eventually([&] { return output == 0 && zeros >= 2; })) << sut.log();
   EXPECT_FALSE(sut.logged("were not set to zero")) << sut.log();
+}
+
+// The device has carried out what it confirmed with noise. Meanwhile the PLC says its earlier value again.
+TEST(ModbusNoise, AValueThatChangesWhileItsResponseIsGarbledIsWritten) {
+  Plant plant;
+  const SerialLine line;
+  std::mutex plc;
+  std::atomic<int> output{0};
+  std::atomic<bool> was_garbled{false};
+  const auto put_out = [&](std::uint16_t value) {
+    const std::lock_guard lock(plc);
+    plant.put_out(0, value);
+  };
+  const ScriptedLine device(line, [&](const Bytes& request) {
+    Bytes frame = ScriptedLine::response(request, 11);
+    if (request[1] == 16) output = request[8];
+    if (request[1] == 16 && request[8] == 99 && !was_garbled) {
+      put_out(5);
+      frame[3] ^= 0x10U;
+      was_garbled = true;
+    }
+    ScriptedLine::send(line, frame);
+  });
+  std::string text = serial_device(line, 1, 0);
+  text.replace(text.find("timeout_ms = 200"), 16, "timeout_ms = 10000\nsilent_after_ms = 600000");
+  const ModbusProgram sut(plant, plant.write(text + "rewrite_ms = 0\n"));
+  ASSERT_TRUE(eventually([&] {
+    put_out(5);
+    return output == 5 && quality_is(plant, 40, Quality::good);
+  })) << sut.log();
+  put_out(99);
+  ASSERT_TRUE(eventually([&] { return was_garbled.load(); })) << sut.log();
+  EXPECT_TRUE(eventually([&] { return output == 5; })) << sut.log();
 }
 
 // It would cost the others of its line twice the time.

@@ -112,6 +112,34 @@ TEST(ModbusProcess, TheEndWaitsForNoStalledDevice) {
   EXPECT_TRUE(in_order);
 }
 
+// 48 coils, which the device switches in 1.4 s. The end comes when `last` of them is on: also in the first
+// poll.
+TEST(ModbusProcess, TheEndSwitchesOffAllCoilsOfADeviceThatTakesOneByOne) {
+  for (const int last : {0, 47}) {
+    Plant plant;
+    const HeldPort port;
+    ModbusPeer peer(port, Mode::slow);
+    std::string text = device(port, "silent_after_ms = 600000");
+    text.resize(text.find("[[device.read]]"));
+    for (const int address : {0, 16, 32}) {
+      text += fmt::format("[[device.write]]\nkind = \"coil\"\naddress = {}\ncount = 16\nimage = \"t.out\"\n",
+                          address);
+      text += "function = \"single\"\nrewrite_ms = 0\n";
+    }
+    plant.put_out(0, 0xffff);
+    ModbusProgram sut(plant, plant.write(text));
+    ASSERT_TRUE(eventually([&] { return peer.coil(last) == 1; })) << sut.log();
+    EXPECT_EQ(sut.end(SIGTERM), 0);
+    peer.set(Mode::normal);
+    EXPECT_TRUE(eventually([&] {
+      int on = 0;
+      for (int i = 0; i < 48; ++i) on += peer.coil(i);
+      return on == 0;
+    })) << last
+        << sut.log();
+  }
+}
+
 TEST(ModbusProcess, AnImageHasOneWriter) {
   Plant plant;
   const HeldPort port;
@@ -233,6 +261,24 @@ TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsRemoved) {
   ModbusProgram second(plant, other_file(plant, device(port)), "second.log");
   EXPECT_EQ(second.end(), 1);
   EXPECT_THAT(second.log(), HasSubstr("writes the outputs of"));
+}
+
+TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsCutShort) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  ModbusProgram first(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  const auto held = claims(plant);
+  ASSERT_EQ(held.size(), 1U);
+  const auto size = std::filesystem::file_size(held.front());
+  std::filesystem::resize_file(held.front(), 0);
+  ASSERT_TRUE(eventually([&] { return std::filesystem::file_size(held.front()) == size; })) << first.log();
+  EXPECT_TRUE(follows(plant, peer, 98)) << first.log();
+  ModbusProgram second(plant, other_file(plant, device(port)), "second.log");
+  EXPECT_EQ(second.end(), 1);
+  EXPECT_EQ(first.end(SIGTERM), 0);
+  EXPECT_FALSE(first.logged("writes the outputs")) << first.log();
 }
 
 TEST(ModbusProcess, DevicesThatOtherProcessesOnlyReadAndOtherUnitsAreFree) {

@@ -99,7 +99,12 @@ LinkResult Device::write_output(Output& output) {
     result = link_.open(config_);
     values = MapValues();
     if (result && !is_due(output, values)) return {};
-    if (result) result = link_.write(config_, *output.map, values);
+    if (result) {
+      // A request without a whole response may be carried out.
+      touched_ = true;
+      output.is_written = false;
+      result = link_.write(config_, *output.map, values);
+    }
     note(write_shape(*output.map), result);
     if (result || !again || !(result.error().at_rest || is_noise(result.error()))) break;
   }
@@ -274,8 +279,11 @@ void Device::report_refused() {
 
 // A device that refuses one map, or that did not answer last, may take the others.
 void Device::make_safe() {
-  if (yields_) return;
-  const bool untouched = quality_ == Quality::none && std::ranges::none_of(outputs_, &Output::is_written);
+  if (yields_) {
+    spdlog::warn("device '{}': its outputs stay as they are: another process writes them", config_.name);
+    return;
+  }
+  const bool untouched = quality_ == Quality::none && !touched_;
   if (config_.when_silent != LossPolicy::zero || untouched) return;
   const Duration limit = quality_ == Quality::lost ? kLastAttempt : kSafeStateTimeout;
   bool is_there = true;

@@ -95,6 +95,7 @@ class Device {
   std::atomic<bool> has_ended_{false};
   std::atomic<bool> yields_{false};
   bool asked_ = false;               ///< the poll has something to ask
+  bool touched_ = false;             ///< outputs were sent to it
   Quality quality_ = Quality::none;  ///< of the last poll
   Quality told_ = Quality::none;     ///< in the log
   LogPause log_pause_;

@@ -119,7 +119,11 @@ Result<void> OutputsClaim::open() {
 Result<void> OutputsClaim::repair() {
   const std::string name = "modbus/" + address_;
   if (plc_image_gone(image_.get(), pool_.c_str(), name.c_str()) == 0) return {};
-  return open();
+  const int held = image_->descriptor;
+  (void)::flock(held, LOCK_UN);  // it may be the same file, cut short
+  auto opened = open();
+  if (!opened) (void)::flock(held, LOCK_EX | LOCK_NB);
+  return opened;
 }
 
 }  // namespace plchost::modbus

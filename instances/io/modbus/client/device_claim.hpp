@@ -22,7 +22,8 @@ class OutputsClaim {
  public:
   /// busy: the text names the process that writes them.
   [[nodiscard]] static Result<OutputsClaim> take(const std::string& pool, const DeviceConfig& device);
-  /// Takes it again if its file was removed, as the end of a host does. busy: another process was faster.
+  /// Takes it again if its file was cut short or removed, as the end of a host does. busy: another process
+  /// was faster.
   [[nodiscard]] Result<void> repair();
 
  private:

@@ -81,7 +81,7 @@ void Link::keep(UniqueFd connection) noexcept {
 
 void Link::interrupt() noexcept {
   const std::lock_guard lock(descriptor_);
-  if (tcp_) ::shutdown(tcp_.get(), SHUT_RDWR);
+  if (tcp_ && !is_end_) ::shutdown(tcp_.get(), SHUT_RDWR);
 }
 
 std::expected<void, std::string> Link::open_tcp(const DeviceConfig& device, Limits limits) {
@@ -127,7 +127,11 @@ Result<void> Link::claim(const DeviceConfig& device) {
 // The claim comes first: to open the line means to set its baud rate.
 std::expected<void, std::string> Link::open_line(const DeviceConfig& device) {
   if (line_is_open_) return {};
-  if (auto claimed = claim(device); !claimed) return Failure(claimed.error().describe());
+  if (!claim_) {
+    auto claimed = claim_line(device.serial);
+    if (!claimed) return Failure(claimed.error().describe());
+    claim_ = std::move(*claimed);
+  }
   if (modbus_connect(line_.get()) != 0) {
     const int error = errno;
     claim_.reset();
@@ -226,7 +230,12 @@ std::expected<Pdu, LinkFailure> Link::receive_line(const DeviceConfig& device, T
 LinkResult Link::request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take) {
   const Turn turn = take_turn();
   if (stop_.is_set() && !limits.at_end) return std::unexpected(not_asked());
+  if (limits.at_end) {
+    const std::lock_guard lock(descriptor_);
+    is_end_ = true;
+  }
   const auto response = line_ ? ask_line(device, limits, asked) : ask_tcp(device, limits, asked);
+  if (response && limits.at_end) answered_at_end_ = MonotonicClock::now();
   auto result = response ? take(response->view()) : LinkResult(std::unexpected(response.error()));
   if (!result && result.error().exception == 0) keep(UniqueFd());
   return result;

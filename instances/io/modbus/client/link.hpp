@@ -55,8 +55,10 @@ class Link {
   /// writes.
   [[nodiscard]] std::uint64_t connection() const noexcept { return connection_; }
 
-  /// A thread that waits for a response on TCP gets none any more.
+  /// A thread that waits for a response on TCP gets none any more, except to write_at_end().
   void interrupt() noexcept;
+  /// When a device last answered to write_at_end().
+  [[nodiscard]] TimePoint answered_at_end() const noexcept { return answered_at_end_; }
 
  private:
   struct Free {
@@ -94,6 +96,8 @@ class Link {
   std::atomic<std::uint64_t> connection_{0};
   std::mutex descriptor_;  ///< for changes of tcp_ beside turn_, and never held while waiting
   UniqueFd tcp_;
+  bool is_end_ = false;  ///< with descriptor_: the request is one of write_at_end(), as all behind it are
+  std::atomic<TimePoint> answered_at_end_{TimePoint()};
 };
 
 }  // namespace plchost::modbus
