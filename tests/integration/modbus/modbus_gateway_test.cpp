@@ -230,6 +230,28 @@ TEST(ModbusGateway, TheFunctionOfAWriteCanBeChosen) {
   }
 }
 
+// The last ones come 1.4 s behind the first one, and the PLC has changed its mind meanwhile.
+TEST(ModbusGateway, CoilsThatAreWrittenOneByOneAreNotOld) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port, Mode::slow);
+  std::string text = device(port, "silent_after_ms = 600000");
+  text.resize(text.find("[[device.read]]"));
+  text += "[[device.write]]\nkind = \"coil\"\naddress = 0\ncount = 64\nimage = \"t.out\"\n";
+  text += "function = \"single\"\nrewrite_ms = 0\n";
+  plant.put_out(6, 0xffff);  // coils 48 to 63
+  const ModbusProgram sut(plant, plant.write(text));
+  ASSERT_TRUE(eventually([&] { return peer.requests() >= 1; })) << sut.log();
+  plant.put_out(6, 0);
+  bool was_on = false;
+  ASSERT_TRUE(eventually([&] {
+    was_on = was_on || peer.coil(48) == 1;
+    return peer.requests() >= 64;
+  })) << sut.log();
+  EXPECT_FALSE(was_on);
+  EXPECT_EQ(peer.coil(62), 0);
+}
+
 // Of the map at 200 the device knows nothing any more.
 TEST(ModbusGateway, ADeviceMayRefuseAnOptionalMap) {
   for (const std::string_view when_gone : {"keep", "zero"}) {

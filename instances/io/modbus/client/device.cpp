@@ -93,6 +93,12 @@ LinkResult Device::write_output(Output& output) {
   // While the others of a serial line have their turns, or a connection is made, the PLC may have stopped.
   const Link::Turn turn = link_.take_turn();
   LinkResult result;
+  bool goes_on = true;
+  const auto look = [&](MapValues& now) {
+    now = MapValues();
+    goes_on = outputs_of(output, now);
+    return goes_on;
+  };
   // A connection at rest may end while it is written to, and a response be garbled. The values are then those
   // of the second attempt.
   for (bool again = true;; again = false) {
@@ -103,13 +109,13 @@ LinkResult Device::write_output(Output& output) {
       // A request without a whole response may be carried out.
       touched_ = true;
       output.is_written = false;
-      result = link_.write(config_, *output.map, values);
+      result = link_.write(config_, *output.map, values, look);
     }
     note(write_shape(*output.map), result);
     if (result || !again || !(result.error().at_rest || is_noise(result.error()))) break;
   }
   asked_ = true;
-  output.is_written = result.has_value();
+  output.is_written = result.has_value() && goes_on;
   output.connection = link_.connection();
   output.written = values;
   output.written_at = MonotonicClock::now();

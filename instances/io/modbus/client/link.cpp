@@ -254,25 +254,30 @@ LinkResult Link::read(const DeviceConfig& device, const RegisterMap& map, MapVal
                  [&](std::span<const std::uint8_t> response) { return take_values(map, response, values); });
 }
 
-LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values) {
-  return write(device, map, values, {.timeout = device.timeout, .once = true});
+LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
+                       const Look& look) {
+  return write(device, map, values, {.timeout = device.timeout, .once = true}, look);
 }
 
 LinkResult Link::write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
                               Duration timeout) {
-  return write(device, map, values, {.timeout = timeout, .at_end = true});
+  return write(device, map, values, {.timeout = timeout, .at_end = true}, {});
 }
 
-LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits) {
+// A map of many requests takes seconds at a slow device: each one has the value of its own time.
+LinkResult Link::write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits,
+                       const Look& look) {
   if (is_one_write(map)) return write_once(device, map, values, limits);
   RegisterMap one = map;
   one.count = 1;
+  MapValues now = values;
   for (std::uint32_t i = 0; i < map.count; ++i) {
+    if (i != 0 && look && !look(now)) return {};
     MapValues value;
     if (is_bit(map.kind)) {
-      value.bits(1)[0] = values.bits(map.count)[i];
+      value.bits(1)[0] = values.bits(map.count)[i] = now.bits(map.count)[i];
     } else {
-      value.registers(1)[0] = values.registers(map.count)[i];
+      value.registers(1)[0] = values.registers(map.count)[i] = now.registers(map.count)[i];
     }
     if (auto written = write_once(device, one, value, limits); !written) return written;
     ++one.address;

@@ -46,7 +46,11 @@ class Link {
   /// The time limit is that of the device, for the connection and for the whole response.
   [[nodiscard]] LinkResult read(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
   /// It is not repeated after LinkFailure::at_rest, because its values may be old by then.
-  [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values);
+  /// `look`: called before each request but the first one of a map that takes several. It brings `values` up
+  /// to date; false: no more is sent. Then `values` holds what was sent last.
+  using Look = std::function<bool(MapValues& values)>;
+  [[nodiscard]] LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
+                                 const Look& look);
   /// The same with a limit of its own, for a connection that has to be made and for the response. Repeated as
   /// a read is, and possible after the stop.
   [[nodiscard]] LinkResult write_at_end(const DeviceConfig& device, const RegisterMap& map, MapValues& values,
@@ -73,7 +77,8 @@ class Link {
   };
   using Take = std::function<LinkResult(std::span<const std::uint8_t> response)>;
   LinkResult request(const DeviceConfig& device, Limits limits, const Pdu& asked, const Take& take);
-  LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
+  LinkResult write(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits,
+                   const Look& look);
   std::expected<Pdu, LinkFailure> ask_tcp(const DeviceConfig& device, Limits limits, const Pdu& asked);
   bool await_line(TimePoint deadline, Limits limits);
   LinkResult write_once(const DeviceConfig& device, const RegisterMap& map, MapValues& values, Limits limits);
