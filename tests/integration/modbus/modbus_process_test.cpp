@@ -249,6 +249,28 @@ TEST(ModbusProcess, AProcessWhoseClaimAnotherOneHasWritesNoOutputs) {
   EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
 }
 
+TEST(ModbusProcess, TheEndTellsThatAnotherProcessWritesTheOutputs) {
+  Plant plant;
+  const HeldPort port;
+  ModbusPeer peer(port);
+  ModbusProgram first(plant, plant.write(device(port)));
+  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
+  ::kill(first.pid(), SIGSTOP);
+  for (const auto& claim : claims(plant)) std::filesystem::remove(claim);
+  std::string text = device(port);
+  text.replace(text.find("address = 7"), 11, "address = 20");
+  const ModbusProgram second(plant, other_file(plant, text), "second.log");
+  ASSERT_TRUE(eventually([&] {
+    plant.put_out(0, 98);
+    return peer.holding(20) == 98;
+  })) << second.log();
+  ::kill(first.pid(), SIGCONT);
+  ASSERT_TRUE(eventually([&] { return first.logged("is lost: another process"); })) << first.log();
+  EXPECT_EQ(first.end(SIGTERM), 0);
+  EXPECT_TRUE(first.logged("its outputs stay as they are: another process writes them")) << first.log();
+  EXPECT_NE(peer.holding(7), 0);
+}
+
 // The end of a host removes the files of its pool.
 TEST(ModbusProcess, TheClaimOfOutputsIsTakenAgainWhenItsFileIsRemoved) {
   Plant plant;
