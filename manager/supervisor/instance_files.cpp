@@ -135,20 +135,18 @@ std::vector<uid_t> users_in(const std::string& run_directory, Claims which) {
 void hand_over_files(const LeftFiles& left, const InstanceUser& user) {
   if (::geteuid() != 0) return;  // nobody else has had instances of another user
   const UserAccount account = account_of(user);
-  const std::string stem = left.run_directory + "/" + left.instance;
-  const std::string claim = stem + ".claim";
-  // The other one also tells of a process with another run directory.
-  for (const std::string& held : {claim, MemoryFile::path(instance_claim_name(left.pool, left.instance))}) {
-    const auto claimed = plain_file(held);
-    if (!claimed || claimed->st_uid == account.number || !is_held(held, *claimed)) continue;
-    return spdlog::error("instance {}: a process of user {} has its name", left.instance, claimed->st_uid);
+  const auto claims = claims_of(left);
+  for (const std::string& claim : claims) {
+    if (const auto owner = user_that_holds(claim); owner && *owner != account.number)
+      return spdlog::error("instance {}: a process of user {} has its name", left.instance, *owner);
   }
-  for (const std::string& path : {claim, instance_socket_path(left.run_directory, left.instance),
+  for (const std::string& path : {claims.front(), instance_socket_path(left.run_directory, left.instance),
                                   values_socket_path(left.run_directory, left.instance)}) {
     if (is_there_of_another(path, account.number)) ::unlink(path.c_str());
   }
   hand_over_all({exception_path(left.run_directory, left.instance),
-                 kept_settings_path(left.run_directory, left.instance), stem + ".events"},
+                 kept_settings_path(left.run_directory, left.instance),
+                 left.run_directory + "/" + left.instance + ".events"},
                 left.instance, account);
   hand_over_retain_memory(left, account);
   remove_pages_of_others(left, account.number);
@@ -166,6 +164,11 @@ void hand_over_retain_files(const std::string& state_directory, const std::strin
   for (const char* end : {".0.new", ".1.new"}) {
     if (is_there_of_another(stem + end, account.number)) ::unlink((stem + end).c_str());
   }
+}
+
+std::array<std::string, 2> claims_of(const LeftFiles& left) {
+  return {instance_claim_path(left.run_directory, left.instance),
+          MemoryFile::path(instance_claim_name(left.pool, left.instance))};
 }
 
 std::optional<uid_t> user_that_holds(const std::string& path) {

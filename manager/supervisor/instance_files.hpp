@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -36,6 +37,9 @@ void hand_over_files(const LeftFiles& left, const InstanceUser& user);
 void hand_over_retain_files(const std::string& state_directory, const std::string& instance,
                             const InstanceUser& user);
 
+/// The lock files by which a process has the name of the instance: in its run directory, and in the pool. The
+/// latter also tells of a process with another run directory.
+[[nodiscard]] std::array<std::string, 2> claims_of(const LeftFiles& left);
 /// The owner of a lock file that a process has locked. Nothing: nobody has, or it is no plain file.
 [[nodiscard]] std::optional<uid_t> user_that_holds(const std::string& path);
 /// Renames a folder in the place of a file of the manager, in the same folder, and logs it. The user of

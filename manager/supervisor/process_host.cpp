@@ -1,5 +1,6 @@
 #include "manager/supervisor/process_host.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <utility>
 
@@ -10,10 +11,8 @@
 #include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
-#include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
-#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 
@@ -56,9 +55,10 @@ std::string ProcessHost::group_name() const {
 }
 
 bool ProcessHost::name_is_held() const {
-  // The other one also tells of a process with another run directory.
-  return user_that_holds(instance_claim_path(settings_.run_directory, settings_.name)).has_value() ||
-         user_that_holds(MemoryFile::path(instance_claim_name(settings_.pool, settings_.name))).has_value();
+  return std::ranges::any_of(
+      claims_of(
+          {.instance = settings_.name, .pool = settings_.pool, .run_directory = settings_.run_directory}),
+      [](const std::string& claim) { return user_that_holds(claim).has_value(); });
 }
 
 // A process that ended while no manager ran may have left others in the group.

@@ -9,15 +9,13 @@
 #include <iterator>
 #include <sstream>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/magic.h>
 #include <sys/stat.h>
 #include <sys/statfs.h>
 #include <unistd.h>
 
-#include "shm/base/system_call.hpp"
-#include "shm/base/unique_fd.hpp"
+#include "shm/files/kernel_file.hpp"
 
 namespace plchost {
 
@@ -29,14 +27,6 @@ constexpr std::array<std::string_view, 2> kLimiting = {"memory", "pids"};
 std::string text_of_file(const std::string& path) {
   std::ifstream file(path);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-Result<void> write_into(const std::string& path, std::string_view text) {
-  const UniqueFd file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-  PLCHOST_TRY(check_errno(file.get(), "cannot open " + path));
-  PLCHOST_TRY(check_errno(::write(file.get(), text.data(), text.size()),
-                          fmt::format("cannot write \"{}\" into {}", text, path)));
-  return {};
 }
 
 bool has_word(const std::string& text, std::string_view wanted) {
@@ -82,7 +72,7 @@ bool remove_group(const std::filesystem::path& folder) {
 Result<void> set_limit(const std::string& group, std::string_view file, std::string_view value) {
   const std::string path = fmt::format("{}/{}", group, file);
   if (::access(path.c_str(), F_OK) != 0) return {};
-  return write_into(path, value);
+  return write_kernel_file(path, value);
 }
 
 std::string limit_text(std::uint64_t limit) {
@@ -171,7 +161,7 @@ void ControlGroups::enable_controllers() {
     if (!has_word(offered, controller)) {
       missing_.push_back({controller, "it is not in cgroup.controllers there"});
     } else if (const auto enabled =
-                   write_into(folder_ + "/cgroup.subtree_control", fmt::format("+{}", controller));
+                   write_kernel_file(folder_ + "/cgroup.subtree_control", fmt::format("+{}", controller));
                !enabled) {
       missing_.push_back({controller, enabled.error().describe()});
     }
@@ -199,7 +189,7 @@ Result<ControlGroups::Made> ControlGroups::make(const std::string& name, const G
 }
 
 void ControlGroups::kill(const std::string& name) const noexcept {
-  if (problem_.empty()) (void)write_into(path(name) + "/cgroup.kill", "1");
+  if (problem_.empty()) (void)write_kernel_file(path(name) + "/cgroup.kill", "1");
 }
 
 bool ControlGroups::was_out_of_memory(const std::string& name) const {

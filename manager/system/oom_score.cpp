@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <fstream>
 
+#include <fmt/format.h>
+
+#include "shm/files/kernel_file.hpp"
+
 namespace plchost {
 
 namespace {
@@ -10,9 +14,7 @@ namespace {
 constexpr const char* kOomScore = "/proc/self/oom_score_adj";
 
 bool write_score(int score) {
-  std::ofstream file(kOomScore);
-  file << score << std::flush;
-  return file.good();
+  return write_kernel_file(kOomScore, fmt::format("{}", score)).has_value();
 }
 
 }  // namespace

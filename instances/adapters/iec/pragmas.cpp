@@ -53,7 +53,7 @@ SourceProblems idle_pragmas(std::span<const Source> sources) {
   SourceProblems remarks;
   for (const auto& [first, count] : found) {
     const std::string more =
-        count == 1 ? "" : fmt::format(", here and in {} other place{}", count - 1, count == 2 ? "" : "s");
+        count == 1 ? "" : fmt::format(", here and in {}", count_text(count - 1, "other place"));
     remarks.push_back({first.place, fmt::format("{} has no effect{}", shown(first.text), more)});
   }
   return remarks;

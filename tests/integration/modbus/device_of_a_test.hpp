@@ -42,8 +42,27 @@ image = "t.out"
                      port.address(), more);
 }
 
-// A device with an input register at byte `offset`, two output registers from `unit` on, and its status 40
-// bytes behind.
+// The maps of a device with an input register at byte `offset`, its status 40 bytes behind, and `outputs`
+// output registers from `unit` on.
+inline std::string unit_maps(int unit, int offset, int outputs) {
+  return fmt::format(R"(
+status_image = "t.in"
+status_offset = {2}
+[[device.read]]
+kind = "input_register"
+address = 100
+image = "t.in"
+offset = {1}
+[[device.write]]
+kind = "holding_register"
+address = {0}
+count = {3}
+image = "t.out"
+)",
+                     unit, offset, 40 + offset, outputs);
+}
+
+// A device with unit_maps() of two outputs.
 inline std::string serial_device(const SerialLine& line, int unit, int offset) {
   return fmt::format(R"(
 [[device]]
@@ -54,21 +73,9 @@ unit = {1}
 poll_ms = 20
 timeout_ms = 200
 reconnect_ms = 100
-reconnect_max_ms = 2000
-status_image = "t.in"
-status_offset = {3}
-[[device.read]]
-kind = "input_register"
-address = 100
-image = "t.in"
-offset = {2}
-[[device.write]]
-kind = "holding_register"
-address = {1}
-count = 2
-image = "t.out"
-)",
-                     line.path(), unit, offset, 40 + offset);
+reconnect_max_ms = 2000)",
+                     line.path(), unit) +
+         unit_maps(unit, offset, 2);
 }
 
 // A PLC that puts this word out again and again, until the register that device() writes has it.

@@ -106,7 +106,7 @@ class NarrowGateway {
   std::thread thread_;
 };
 
-// As serial_device(): its status is 40 bytes behind `offset`, its outputs are from register `unit` on.
+// A device with unit_maps() of one output.
 std::string unit_at(const HeldPort& port, int unit, int offset, int timeout_ms, std::string_view more = "") {
   return fmt::format(R"(
 [[device]]
@@ -114,23 +114,12 @@ name = "unit{1}"
 tcp = "{0}"
 unit = {1}
 poll_ms = 10
-timeout_ms = {5}
+timeout_ms = {3}
 reconnect_ms = 100
 reconnect_max_ms = 1000
-status_image = "t.in"
-status_offset = {3}
-{4}
-[[device.read]]
-kind = "input_register"
-address = 100
-image = "t.in"
-offset = {2}
-[[device.write]]
-kind = "holding_register"
-address = {1}
-image = "t.out"
-)",
-                     port.address(), unit, offset, 40 + offset, more, timeout_ms);
+{2})",
+                     port.address(), unit, more, timeout_ms) +
+         unit_maps(unit, offset, 1);
 }
 
 TEST(ModbusGateway, UnitsOfOneAddressShareAConnection) {

@@ -217,58 +217,53 @@ std::vector<std::filesystem::path> claims(const Plant& plant) {
   return found;
 }
 
-// It stands still while its claim is removed, and another process is faster.
-TEST(ModbusProcess, AProcessWhoseClaimAnotherOneHasWritesNoOutputs) {
+// A process that writes the outputs stands still while its claim is removed, and another one with an output
+// at register 20 is faster.
+struct Overtaken {
+  Overtaken() {
+    EXPECT_TRUE(follows(plant, peer, 99)) << first.log();
+    ::kill(first.pid(), SIGSTOP);
+    for (const auto& claim : claims(plant)) std::filesystem::remove(claim);
+    std::string text = device(port);
+    text.replace(text.find("address = 7"), 11, "address = 20");
+    second.emplace(plant, other_file(plant, text), "second.log");
+    EXPECT_TRUE(reaches_second(98)) << second->log();
+    ::kill(first.pid(), SIGCONT);
+  }
+  bool reaches_second(std::uint16_t word) {
+    return eventually([&] {
+      plant.put_out(0, word);
+      return peer.holding(20) == word;
+    });
+  }
+
   Plant plant;
-  const HeldPort port;
-  ModbusPeer peer(port);
-  ModbusProgram first(plant, plant.write(device(port)));
-  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
-  ::kill(first.pid(), SIGSTOP);
-  for (const auto& claim : claims(plant)) std::filesystem::remove(claim);
-  std::string text = device(port);
-  text.replace(text.find("address = 7"), 11, "address = 20");
-  ModbusProgram second(plant, other_file(plant, text), "second.log");
-  EXPECT_TRUE(eventually([&] {
-    plant.put_out(0, 98);
-    return peer.holding(20) == 98;
-  })) << second.log();
-  ::kill(first.pid(), SIGCONT);
-  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::lost); })) << first.log();
-  EXPECT_TRUE(eventually([&] { return first.logged("is lost: another process writes its outputs"); }));
-  EXPECT_TRUE(
-      eventually([&] { return first.logged(fmt::format("process {} (plchost-modbus", second.pid())); }));
-  const int before = peer.holding(7);
-  EXPECT_TRUE(eventually([&] {
-    plant.put_out(0, 97);
-    return peer.holding(20) == 97;
-  }));
-  EXPECT_EQ(peer.holding(7), before);
-  EXPECT_EQ(second.end(SIGTERM), 0);
-  EXPECT_TRUE(follows(plant, peer, 96)) << "the claim is free: " << first.log();
-  EXPECT_TRUE(eventually([&] { return quality_is(plant, 56, Quality::good); }));
+  HeldPort port;
+  ModbusPeer peer{port};
+  ModbusProgram first{plant, plant.write(device(port))};
+  std::optional<ModbusProgram> second;
+};
+
+TEST(ModbusProcess, AProcessWhoseClaimAnotherOneHasWritesNoOutputs) {
+  Overtaken at;
+  EXPECT_TRUE(eventually([&] { return quality_is(at.plant, 56, Quality::lost); })) << at.first.log();
+  EXPECT_TRUE(eventually([&] { return at.first.logged("is lost: another process writes its outputs"); }));
+  EXPECT_TRUE(eventually(
+      [&] { return at.first.logged(fmt::format("process {} (plchost-modbus", at.second->pid())); }));
+  const int before = at.peer.holding(7);
+  EXPECT_TRUE(at.reaches_second(97));
+  EXPECT_EQ(at.peer.holding(7), before);
+  EXPECT_EQ(at.second->end(SIGTERM), 0);
+  EXPECT_TRUE(follows(at.plant, at.peer, 96)) << "the claim is free: " << at.first.log();
+  EXPECT_TRUE(eventually([&] { return quality_is(at.plant, 56, Quality::good); }));
 }
 
 TEST(ModbusProcess, TheEndTellsThatAnotherProcessWritesTheOutputs) {
-  Plant plant;
-  const HeldPort port;
-  ModbusPeer peer(port);
-  ModbusProgram first(plant, plant.write(device(port)));
-  ASSERT_TRUE(follows(plant, peer, 99)) << first.log();
-  ::kill(first.pid(), SIGSTOP);
-  for (const auto& claim : claims(plant)) std::filesystem::remove(claim);
-  std::string text = device(port);
-  text.replace(text.find("address = 7"), 11, "address = 20");
-  const ModbusProgram second(plant, other_file(plant, text), "second.log");
-  ASSERT_TRUE(eventually([&] {
-    plant.put_out(0, 98);
-    return peer.holding(20) == 98;
-  })) << second.log();
-  ::kill(first.pid(), SIGCONT);
-  ASSERT_TRUE(eventually([&] { return first.logged("is lost: another process"); })) << first.log();
-  EXPECT_EQ(first.end(SIGTERM), 0);
-  EXPECT_TRUE(first.logged("its outputs stay as they are: another process writes them")) << first.log();
-  EXPECT_NE(peer.holding(7), 0);
+  Overtaken at;
+  ASSERT_TRUE(eventually([&] { return at.first.logged("is lost: another process"); })) << at.first.log();
+  EXPECT_EQ(at.first.end(SIGTERM), 0);
+  EXPECT_TRUE(at.first.logged("its outputs stay as they are: another process writes them")) << at.first.log();
+  EXPECT_NE(at.peer.holding(7), 0);
 }
 
 // The end of a host removes the files of its pool.
