@@ -144,7 +144,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
 }
 build_asan() { build_sanitized .build/asan "address;undefined" all; }
 build_tsan() { build_sanitized .build/tsan thread plchost_tests; }
-gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prose.py && tests/gates/prove.sh; }
+gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/c_files.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prose.py && tests/gates/prove.sh; }
 
 # ctest's own lines, and at the end what CI reads
 passed=0

@@ -363,6 +363,16 @@ sed -i 's/p == 0/p == nullptr/' "$plot/tree/shm/base/planted.cpp"
 echo '[]' >"$plot/tidy/compile_commands.json"
 must_be_red "clang-tidy: nothing" "there is no unit in" "$gates/tidy.sh" "$plot/tidy"
 
+new_tree
+must_be_red "C files: nothing" "no C file was found" bash -c "git -C '$plot/tree' init -q && '$gates/c_files.sh' '$plot/tree'"
+printf '#include <stdlib.h>\nint planted(void);\nint planted(void) {\n  int* p = malloc(sizeof *p);\n  if (p == NULL) return 0;\n  free(p);\n  return *p;\n}\n' >"$plot/tree/shm/planted.c"
+commit_tree
+must_be_red "C files: gcc's analyzer" "analyzer-use-after-free" "$gates/c_files.sh" "$plot/tree"
+printf 'int planted(int n);\nint planted(int n) {\n  int a[2] = {0, 0};\n  if (n == 2) return a[n];\n  return a[0];\n}\n' >"$plot/tree/shm/planted.c"
+must_be_red "C files: cppcheck" "[arrayIndexOutOfBoundsCond]" "$gates/c_files.sh" "$plot/tree"
+printf 'int planted(void);\nint planted(void) { return 1; }\n' >"$plot/tree/shm/planted.c"
+"$gates/c_files.sh" "$plot/tree" || { echo "a clean C file does not pass the analyzers"; failed=1; }
+
 # Joined, these two would compile.
 mkdir -p "$plot/alone"
 echo 'template <class T> T twice(T n);' >"$plot/tree/shm/base/planted.hpp"

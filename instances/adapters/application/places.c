@@ -248,18 +248,37 @@ static void preset(const struct area* area) {
   }
 }
 
+/* Of all areas together. */
+static unsigned char* initial_bytes = NULL;
+static Plc_Area_Use* area_users = NULL;
+
+static int allocate_areas(void) {
+  unsigned int i;
+  unsigned int bytes = 0;
+  for (i = 0; i < plchost_place_count; ++i) {
+    const struct plchost_place* const place = &plchost_places[i];
+    struct area* const area = area_of(place);
+    const unsigned int end = place->offset + place->bytes;
+    if (end > area->bytes) area->bytes = end;
+  }
+  for (i = 0; i < AREAS; ++i) bytes += areas[i].bytes;
+  if (bytes == 0) return 1;
+  initial_bytes = calloc(bytes, 1);
+  area_users = calloc(AREAS * plchost_task_count, sizeof *area_users);
+  if (initial_bytes == NULL || area_users == NULL) return 0;
+  bytes = 0;
+  for (i = 0; i < AREAS; ++i) {
+    areas[i].initial = initial_bytes + bytes;
+    areas[i].users = area_users + i * plchost_task_count;
+    bytes += areas[i].bytes;
+  }
+  return 1;
+}
+
 static int declare(struct area* area) {
   unsigned int i;
   Plc_Area declared;
-  for (i = 0; i < plchost_place_count; ++i) {
-    const struct plchost_place* const place = &plchost_places[i];
-    const unsigned int end = place->offset + place->bytes;
-    if (place->area == area->letter && end > area->bytes) area->bytes = end;
-  }
   if (area->bytes == 0) return 1;
-  area->initial = calloc(area->bytes, 1);
-  area->users = calloc(plchost_task_count, sizeof *area->users);
-  if (area->initial == NULL || area->users == NULL) return 0;
   preset(area);
   memset(&declared, 0, sizeof declared);
   declared.dwSize = sizeof declared;
@@ -284,6 +303,7 @@ int plchost_declare_places(void) {
     /* An output is what the program has; an edge is one of a value of before. */
     if (plc_keep_variables(place->name, place->value, place->bytes, 0) != ERR_OK) return 0;
   }
+  if (!allocate_areas()) return 0;
   for (i = 0; i < AREAS; ++i) {
     if (!declare(&areas[i])) return 0;
   }
@@ -291,9 +311,6 @@ int plchost_declare_places(void) {
 }
 
 void plchost_forget_places(void) {
-  unsigned int i;
-  for (i = 0; i < AREAS; ++i) {
-    free(areas[i].initial);
-    free(areas[i].users);
-  }
+  free(initial_bytes);
+  free(area_users);
 }
