@@ -197,7 +197,8 @@ fuzz() {
 fuzz_one() {
   local corpus code=0
   corpus=$(mktemp -d)
-  "$1" -max_total_time="${FUZZ_SECONDS:-5}" -rss_limit_mb=2048 -print_final_stats=1 "$corpus" || code=1
+  # New inputs go to the first folder. The second has those of before.
+  "$1" -max_total_time="${FUZZ_SECONDS:-5}" -rss_limit_mb=2048 -print_final_stats=1 "$corpus" "tests/fuzz/corpus/${1##*/fuzz_}" || code=1
   rm -rf "$corpus"
   return "$code"
 }

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "shm/base/plain_json.hpp"
 #include "shm/files/read_plain_file.hpp"
 #include "shm/files/replace_file.hpp"
 #include "shm/log/log.hpp"
@@ -99,7 +100,7 @@ Result<ExceptionHistory> read_exceptions(const std::string& path) {
   if (!text && text.error().code == ErrorCode::not_found) return ExceptionHistory{};
   if (!text && text.error().code == ErrorCode::wrong_type) return corrupt(path, "is no plain file");
   PLCHOST_TRY(text);
-  const Json json = Json::parse(*text, nullptr, false);
+  const Json json = plain_json(*text);
   if (!json.is_object()) return corrupt(path, "is not a JSON object");
   try {
     if (json.value("version", 0) != kVersion) return corrupt(path, "is of another version");

@@ -17,6 +17,16 @@ namespace plchost {
 
 static_assert(offsetof(TransitionRingLayout, version) == 8 && sizeof(Transition) == 232);
 
+namespace {
+
+Transition with_printable_reason(Transition transition) {
+  const std::string_view reason = transition.reason.view();
+  if (!is_printable_utf8(reason)) transition.reason.assign(printable(std::string(reason)));
+  return transition;
+}
+
+}  // namespace
+
 std::string_view to_string(TransitionSource source) noexcept {
   switch (source) {
     case TransitionSource::application:
@@ -81,7 +91,7 @@ std::int64_t TransitionRingReader::stream_unix_ns() const noexcept {
   return page_.layout().stream_unix_ns;
 }
 
-std::optional<Transition> TransitionRingReader::next(TimePoint now) noexcept {
+std::optional<Transition> TransitionRingReader::next(TimePoint now) {
   for (;;) {
     const std::uint64_t last = page_.last();
     if (next_ > last) return std::nullopt;
@@ -93,7 +103,7 @@ std::optional<Transition> TransitionRingReader::next(TimePoint now) noexcept {
     }
     waits_since_.reset();
     ++next_;
-    if (found) return found;
+    if (found) return with_printable_reason(*found);
   }
 }
 

@@ -78,8 +78,9 @@ class TransitionRingReader {
   [[nodiscard]] static Result<TransitionRingReader> open(std::string_view pool, std::string_view instance);
 
   [[nodiscard]] std::int64_t stream_unix_ns() const noexcept;
-  /// The next one; nothing: no more at present. Numbers that are missing were overtaken.
-  [[nodiscard]] std::optional<Transition> next(TimePoint now) noexcept;
+  /// The next one; nothing: no more at present. Numbers that are missing were overtaken. Its reason is
+  /// printable.
+  [[nodiscard]] std::optional<Transition> next(TimePoint now);
 
  private:
   explicit TransitionRingReader(TransitionRingPage page) noexcept : page_(std::move(page)) {}

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "api/cli/debug/dap_messages.hpp"
+#include "api/cli/debug/foreign_json.hpp"
 #include "instances/runtime/debug/breakpoint.hpp"
 #include "instances/runtime/debug/condition.hpp"
 #include "instances/runtime/debug/declared_pou.hpp"
@@ -41,27 +42,35 @@ void read_messages(std::string_view text) {
       if (!message) return;
       if (!*message) break;
       if (dap_packet(**message).empty()) std::abort();
+      if (text_in(**message, "command").empty()) (void)number_in(**message, "seq");
     }
   }
 }
 
-// A condition that is accepted can be evaluated, in a frame with variables and in one without.
-void make_breakpoint(std::string_view text) {
-  const auto order = BreakpointOrder::parse(text);
-  if (!order || order->place.empty()) return;
-  (void)HitRule::parse(order->hits);
-  (void)LogTemplate::parse(order->log, find_value);
-  const auto condition = Condition::parse(order->condition, find_value);
-  if (!condition) return;
+// An accepted text can be evaluated, in a frame with variables and in one without.
+void evaluate(const Condition& condition) {
   std::array<std::byte, 512> self{};
   const std::array<void*, 2> locals{self.data(), nullptr};
   Plc_Frame frame{};
-  (void)condition->holds(frame);
+  (void)condition.holds(frame);
   frame.pSelf = self.data();
   frame.ppLocals = locals.data();
   frame.dwFirstLocal = 2;
   frame.nLocals = locals.size();
-  (void)condition->holds(frame);
+  (void)condition.holds(frame);
+}
+
+void read_parts(std::string_view hits, std::string_view log, std::string_view condition) {
+  if (const auto rule = HitRule::parse(hits)) {
+    for (const std::uint64_t hit : {1U, 2U}) (void)rule->holds(hit);
+  }
+  (void)LogTemplate::parse(log, find_value);
+  if (const auto read = Condition::parse(condition, find_value)) evaluate(*read);
+}
+
+void make_breakpoint(std::string_view text) {
+  const auto order = BreakpointOrder::parse(text);
+  if (order && !order->place.empty()) read_parts(order->hits, order->log, order->condition);
 }
 
 void find_place(std::string_view text) {
@@ -83,7 +92,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   read_messages(text);
   make_breakpoint(text);
-  (void)Condition::parse(text, find_value);
+  read_parts(text, text, text);
   find_place(text);
   return 0;
 }

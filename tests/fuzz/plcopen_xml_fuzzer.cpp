@@ -120,7 +120,8 @@ void read(const std::string& xml) {
   iec::SourceProblems problems;
   const std::array<iec::Source, 1> sources{projects.take({"a.xml", xml}, problems)};
   require_places(problems, lines);
-  iec::SourceProblems later = iec::read_project(sources).problems;
+  auto [project, later] = iec::read_project(sources);
+  for (iec::Configuration& configuration : project.configurations) projects.add_events(configuration);
   iec::SourceProblems remarks;
   if (!problems.empty()) return;
   projects.restore(later, remarks);

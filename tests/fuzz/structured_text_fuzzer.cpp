@@ -129,10 +129,13 @@ void read_task_file(const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text = text_of({data, size}, kWords);
   read_task_file(text_of({data, size}, kTomlWords));
+  const std::string raw(reinterpret_cast<const char*>(data), size);
+  read_task_file(raw);
+  const std::array<iec::Source, 1> as_it_is{{{"a.st", raw}}};
+  require_places(iec::read_project(as_it_is).problems);
   const std::array<iec::Source, 1> sources{{{"a.st", text}}};
   const auto [project, problems] = iec::read_project(sources);
   require_places(problems);
-  const std::string raw(reinterpret_cast<const char*>(data), size);
   (void)matiec::problems_of(raw, matiec::JoinedSource(sources), project, "/nowhere");
   const auto located = matiec::located_variables(raw);
   if (!problems.empty()) return 0;

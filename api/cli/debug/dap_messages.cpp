@@ -8,6 +8,7 @@
 
 #include "api/cli/debug/foreign_json.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/plain_json.hpp"
 
 namespace plchost {
 

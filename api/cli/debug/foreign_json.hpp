@@ -9,10 +9,7 @@
 
 namespace plchost {
 
-/// Levels of an object that another program has sent. Each takes stack when a value is copied or freed.
-inline constexpr int kMaxJsonDepth = 32;
-
-/// Nothing: the text is no object of JSON, or it is deeper than kMaxJsonDepth.
+/// Nothing: plain_json() makes no object of the text.
 [[nodiscard]] std::optional<nlohmann::json> object_in(std::string_view text);
 
 /// A member of such an object; 0, or no text: it is not there, or of another kind.

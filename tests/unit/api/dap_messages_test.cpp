@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "api/cli/debug/foreign_json.hpp"
+#include "shm/base/plain_json.hpp"
 
 namespace plchost {
 namespace {

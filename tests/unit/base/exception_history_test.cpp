@@ -112,13 +112,24 @@ TEST_F(ExceptionHistoryTest, IsNotReadThroughALink) {
 TEST_F(ExceptionHistoryTest, RefusesWhatIsSomethingElse) {
   for (const char* const text :
        {"", "{", "[]", "{\"version\":9}", "{\"version\":1,\"exceptions\":[{\"number\":\"x\"}]}",
-        "{\"version\":1,\"exceptions\":[7]}"}) {
+        "{\"version\":1,\"exceptions\":[7]}", "{\"version\":28446744073709551615}", "{\"version\":1.0}"}) {
     write(text);
     const auto history = read_exceptions(path_);
     ASSERT_FALSE(history) << text;
     EXPECT_EQ(history.error().code, ErrorCode::corrupt) << text;
     EXPECT_THAT(history.error().message, testing::HasSubstr(path_));
   }
+}
+
+// It would take the stack of each process that reads it.
+TEST_F(ExceptionHistoryTest, RefusesAFileOfManyLevels) {
+  constexpr std::size_t kLevels = 100'000;
+  const std::string file =
+      "{\"version\":1,\"exceptions\":" + std::string(kLevels, '[') + std::string(kLevels, ']') + "}";
+  write(file);
+  const auto history = read_exceptions(path_);
+  ASSERT_FALSE(history);
+  EXPECT_EQ(history.error().code, ErrorCode::corrupt);
 }
 
 }  // namespace

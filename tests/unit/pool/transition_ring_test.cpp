@@ -167,5 +167,15 @@ TEST_F(Transitions, AreWrittenByTheOwnerAndTheUsersOfInstances) {
   EXPECT_EQ(mode(), 0640U);
 }
 
+// Each process that may write the ring is a stranger to those that show it.
+TEST_F(Transitions, HaveAReasonThatCanBePrinted) {
+  TransitionRing ring = writer();
+  TransitionRingReader sut = reader();
+  ring.add(TransitionSource::application, 1, 2, 4711, "a\x1b[2Jb\xffz");
+  const auto seen = sut.next(now_);
+  ASSERT_TRUE(seen);
+  EXPECT_EQ(seen->reason.view(), "a?[2Jb?z");
+}
+
 }  // namespace
 }  // namespace plchost
