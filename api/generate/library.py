@@ -100,7 +100,7 @@ def field_of(kind, member, told, words, nested):
         is_list = "with commas between" in member.comment
         text = text.replace(", with commas between", "")
         made = ("std::vector<std::string>", f"list_in(dds::text_of({from_sample}))") if is_list else (
-            "std::string", f"std::string(dds::text_of({from_sample}))")
+            "std::string", f"text_in(dds::text_of({from_sample}))")
     elif base == "boolean":
         made = ("bool", from_sample)
     elif name.endswith("_unix_ns"):

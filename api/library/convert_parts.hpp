@@ -15,16 +15,22 @@
 #include <fmt/ranges.h>
 
 #include "api/dds/sequence.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
 // From members of samples to those of the library's types: for library_conversions.hpp, which the build
 // makes.
 
+/// UTF-8 without control characters, whatever the host or an application has written.
+[[nodiscard]] inline std::string text_in(std::string_view text) {
+  return printable(std::string(text));
+}
+
 /// The words of "a,b".
 [[nodiscard]] inline std::vector<std::string> list_in(std::string_view text) {
   std::vector<std::string> words;
-  for (const auto word : std::views::split(text, ',')) words.emplace_back(std::string_view(word));
+  for (const auto word : std::views::split(text, ',')) words.push_back(text_in(std::string_view(word)));
   return words;
 }
 

@@ -13,6 +13,7 @@
 #include "api/client/client_core_status.hpp"
 #include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
+#include "api/library/convert_parts.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -31,7 +32,7 @@ Client::Value value_of(const dds::FieldInfo& field, const Value& value) {
       return static_cast<unsigned long long>(value);
     }
   } else if constexpr (std::convertible_to<Value, std::string_view>) {
-    return std::string(value);
+    return text_in(value);
   } else {
     return fmt::format("{:02x}", fmt::join(value, ""));
   }
@@ -45,9 +46,9 @@ Client::Record record_of(const Sample& sample) {
   });
   // The members that a newer host has more.
   for (const plc_KeyValue& entry : dds::parts_of(sample.ext)) {
-    std::string name(dds::text_of(entry.name));
+    std::string name = text_in(dds::text_of(entry.name));
     if (std::ranges::find(record, name, &Client::Record::value_type::first) != record.end()) continue;
-    record.emplace_back(std::move(name), std::string(dds::text_of(entry.value)));
+    record.emplace_back(std::move(name), text_in(dds::text_of(entry.value)));
   }
   return record;
 }
