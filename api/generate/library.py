@@ -14,6 +14,7 @@ import textwrap
 from contract import Fault
 
 LEFT_OUT = ("epoch", "round", "ext", "counts")
+SEPARATORS = {"commas": "','", "line feeds": r"'\n'"}
 NUMBERS = {
     "short": "int",
     "long": "int",
@@ -97,9 +98,9 @@ def field_of(kind, member, told, words, nested):
         made = ("std::string", f"dds::word_for(dds::words::{kind.name}::{coded[1] if coded else member.name}, {from_sample})")
         text = ", ".join(words)
     elif base.startswith("string<"):
-        is_list = "with commas between" in member.comment
-        text = text.replace(", with commas between", "")
-        made = ("std::vector<std::string>", f"list_in(dds::text_of({from_sample}))") if is_list else (
+        between = re.search(r", with (commas|line feeds) between", member.comment)
+        text = text.replace(between[0], "") if between else text
+        made = ("std::vector<std::string>", f"list_in(dds::text_of({from_sample}), {SEPARATORS[between[1]]})") if between else (
             "std::string", f"text_in(dds::text_of({from_sample}))")
     elif base == "boolean":
         made = ("bool", from_sample)

@@ -27,10 +27,10 @@ namespace plchost {
   return printable(std::string(text));
 }
 
-/// The words of "a,b".
-[[nodiscard]] inline std::vector<std::string> list_in(std::string_view text) {
+/// The parts of "a,b" between the commas, or whatever `separator` is.
+[[nodiscard]] inline std::vector<std::string> list_in(std::string_view text, char separator) {
   std::vector<std::string> words;
-  for (const auto word : std::views::split(text, ',')) words.push_back(text_in(std::string_view(word)));
+  for (const auto word : std::views::split(text, separator)) words.push_back(text_in(std::string_view(word)));
   return words;
 }
 

@@ -186,6 +186,8 @@ void ProcessHost::process_ended() {
   read_replies();
   end_session(*process_);
   const bool out_of_memory = end_group();
+  // It may have ended before it wrote down the fault of a task.
+  if (const auto left = left_runtime(); left && left->pid == process_->pid) (void)keep_lost_faults();
   output_.end(process_->pid);
   ExitStatus status = reap_process(*process_);
   // Else the kernel has ended a child of the application earlier.

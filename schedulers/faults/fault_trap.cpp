@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "schedulers/faults/processor_guard.hpp"
+#include "schedulers/faults/stack_walk.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 #include "shm/guard/memory_guard.hpp"
@@ -98,14 +99,20 @@ bool TaskFault::claim(bool whole_application) noexcept {
   return true;
 }
 
+void TaskFault::show() noexcept {
+  if (shown_ != nullptr) shown_->write(record_);
+}
+
 void TaskFault::publish() noexcept {
   // First: the control thread may never get to write it down.
-  if (shown_ != nullptr) shown_->write(record_);
+  show();
   state_.store(State::published, std::memory_order_release);
   if (board_ != nullptr) board_->notify();
 }
 
-void FaultTrap::arm(TaskFault& fault, TimePoint start, bool event_variable) noexcept {
+// Never a part of its caller: it needs the place where that one's stack ends.
+[[gnu::noinline]] void FaultTrap::arm(TaskFault& fault, TimePoint start, bool event_variable) noexcept {
+  bottom_ = reinterpret_cast<std::uintptr_t>(__builtin_dwarf_cfa());
   if (own_thread == 0) own_thread = ::gettid();
   thread_.store(own_thread, std::memory_order_relaxed);
   event_variable_ = event_variable;
@@ -139,10 +146,11 @@ void FaultTrap::fill_struck(FaultRecord& record) const noexcept {
   record.limit = struck_limit_.load(std::memory_order_relaxed);
 }
 
-/// The code in signal context uses only atomics, system calls and the memory of the trap's task.
+/// The code in signal context uses only atomics, system calls, the memory of the trap's task, and StackWalk.
 struct FaultHandlers {
   static void on_fault(int signal, siginfo_t* info, void* context) noexcept {
     const int saved = errno;
+    StackWalk::interrupted();
     // A stranger's damage to a shared memory is not the application's fault, and no cause of an end.
     if (signal == SIGBUS && info->si_code == BUS_ADRERR && MemoryGuard::mend(info->si_addr)) {
       errno = saved;
@@ -170,6 +178,7 @@ struct FaultHandlers {
       const bool no_code =
           signal == SIGSEGV && info->si_code != SI_KERNEL && record.memory_address == record.address;
       if (no_code) record.caller = caller_of(*static_cast<const ucontext_t*>(context));
+      trace(fault, trap, context);
       park(trap, fault);
     }
     park(trap);
@@ -184,6 +193,7 @@ struct FaultHandlers {
     if (TaskFault& fault = *trap.fault(); fault.claim(trap.event_variable_)) {
       fill(fault.record(), trap, context);
       trap.fill_struck(fault.record());
+      trace(fault, trap, context);
       park(trap, fault);
     }
     park(trap);
@@ -193,6 +203,12 @@ struct FaultHandlers {
   static void fill(FaultRecord& record, const FaultTrap& trap, const void* context) noexcept {
     record.in_event_variable = trap.event_variable_;
     record.address = instruction_of(*static_cast<const ucontext_t*>(context));
+  }
+
+  static void trace(TaskFault& fault, const FaultTrap& trap, void* context) noexcept {
+    fault.show();  // the walk may end the process
+    FaultRecord& record = fault.record();
+    StackWalk::walk(record.back_trace, *static_cast<ucontext_t*>(context), trap.bottom_, record.caller);
   }
 
   // All signals are blocked in the handlers, so nothing brings the thread back.
@@ -208,6 +224,7 @@ struct FaultHandlers {
 };
 
 Result<void> install_fault_handlers() {
+  StackWalk::prepare();
   struct sigaction action{};
   action.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_RESTART;
   ::sigfillset(&action.sa_mask);

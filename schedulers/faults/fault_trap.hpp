@@ -37,7 +37,8 @@ inline constexpr std::array kFaultSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SI
 /// where it stands, for good: its state is kept for diagnosis, and nothing of it is undone.
 class FaultTrap {
  public:
-  /// From now on this thread runs code of the task whose fault this is. Real-time; the trap's own thread.
+  /// From now on this thread runs code of the task whose fault this is: functions that the caller calls.
+  /// Real-time; the trap's own thread.
   void arm(TaskFault& fault, TimePoint start, bool event_variable = false) noexcept;
   /// The same, for the next one of several tasks that are looked at in one go.
   void change(TaskFault& fault) noexcept { fault_.store(&fault, std::memory_order_relaxed); }
@@ -74,6 +75,7 @@ class FaultTrap {
   std::atomic<pid_t> thread_{0};
   std::atomic<bool> parked_{false};
   bool event_variable_ = false;
+  std::uintptr_t bottom_ = 0;  // the stack pointer of the function that has called arm()
   // The order of strike(); written before the signal is sent.
   std::atomic<Duration::rep> struck_{0};
   std::atomic<FaultKind> struck_kind_{FaultKind::task_watchdog};

@@ -52,6 +52,8 @@ class TaskFault {
   /// Any context, signal handlers included. `whole_application`: under any policy.
   [[nodiscard]] bool claim(bool whole_application = false) noexcept;
   [[nodiscard]] FaultRecord& record() noexcept { return record_; }
+  /// Shows the record as far as it is known, before anything that may end the process.
+  void show() noexcept;
   void publish() noexcept;
 
   [[nodiscard]] bool raised() const noexcept { return state_.load(std::memory_order_relaxed) != State::none; }

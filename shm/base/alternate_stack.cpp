@@ -15,7 +15,8 @@ std::size_t page() noexcept {
   return static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// The processor's state as the kernel stores it, and room for the handler.
+// The processor's state as the kernel stores it, twice: the handler may read a stack that has a fault itself.
+// And room for the handlers.
 std::size_t usable_size() noexcept {
 #if defined(PLCHOST_THREAD_SANITIZER) || defined(PLCHOST_ADDRESS_SANITIZER)
   constexpr std::size_t kHandler = std::size_t{128} << 10;
@@ -23,7 +24,7 @@ std::size_t usable_size() noexcept {
   constexpr std::size_t kHandler = std::size_t{16} << 10;
 #endif
   const auto frame = static_cast<std::size_t>(std::max(::sysconf(_SC_MINSIGSTKSZ), 0L));
-  return (frame + kHandler + page() - 1) / page() * page();
+  return (2 * frame + kHandler + page() - 1) / page() * page();
 }
 
 }  // namespace

@@ -92,6 +92,23 @@ std::string_view to_string(FaultKind kind) noexcept {
   return "unknown";
 }
 
+std::string describe_end(const BackTrace& trace) {
+  switch (trace.end) {
+    case BackTrace::End::none:
+      return "nothing has stopped the thread within its code";
+    case BackTrace::End::whole:
+      return {};
+    case BackTrace::End::deep:
+      return fmt::format("only the innermost {} functions are known", BackTrace::kMost);
+    case BackTrace::End::lost:
+      return "the caller of the last function is not known: it has no unwind tables, or the stack is "
+             "overwritten";
+    case BackTrace::End::damaged:
+      return "the stack is overwritten: it leads to memory that cannot be read";
+  }
+  return "not known";
+}
+
 std::string signal_name(int signal) {
   constexpr std::array kNames = {
       std::pair{SIGSEGV, "SIGSEGV"}, std::pair{SIGBUS, "SIGBUS"},   std::pair{SIGFPE, "SIGFPE"},

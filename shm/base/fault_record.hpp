@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -29,6 +31,24 @@ enum class StopPhase : std::uint8_t {
   single_cycle,  ///< a single cycle of all tasks
 };
 
+/// The functions that a thread was in when it was stopped.
+struct BackTrace {
+  static constexpr std::size_t kMost = 32;
+  /// Why there are no more.
+  enum class End : std::uint8_t {
+    none,     ///< there is none at all: nothing has stopped the thread within its code
+    whole,    ///< the last one is the first that the runtime has called
+    deep,     ///< there are more than kMost
+    lost,     ///< the caller of the last one is not known
+    damaged,  ///< the stack leads to memory that cannot be read
+  };
+  std::array<std::uint64_t, kMost> addresses{};  ///< of the instruction, then those that calls return to
+  std::uint8_t count = 0;
+  End end = End::none;
+};
+/// "only the innermost 32 functions are known"; empty: it is whole.
+[[nodiscard]] std::string describe_end(const BackTrace& trace);
+
 /// One fault, as it was found, in shared memory, too. Filled by its finder, also from within a signal
 /// handler: so no texts are made here, see describe_fault().
 struct FaultRecord {
@@ -51,6 +71,7 @@ struct FaultRecord {
   std::int64_t unix_ns = 0;              ///< CLOCK_REALTIME
   FixedText<kMaxText> text;              ///< cpp_exception: its what(); no_processor: the thread
   FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
+  BackTrace back_trace;
 };
 
 /// In words: the cause, with its figures. Without addresses, which only the process can name.

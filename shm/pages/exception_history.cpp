@@ -32,7 +32,9 @@ Json to_json(const ExceptionEntry& entry) {
           {"address", entry.address},
           {"symbol", entry.symbol},
           {"memory_address", entry.memory_address},
-          {"text", entry.text}};
+          {"text", entry.text},
+          {"back_trace", entry.back_trace},
+          {"back_trace_end", entry.back_trace_end}};
 }
 
 // value() throws if a key is there with another type; the caller catches.
@@ -47,11 +49,23 @@ ExceptionEntry from_json(const Json& json) {
           .address = json.value("address", std::uint64_t{0}),
           .symbol = json.value("symbol", std::string()),
           .memory_address = json.value("memory_address", std::uint64_t{0}),
-          .text = json.value("text", std::string())};
+          .text = json.value("text", std::string()),
+          .back_trace = json.value("back_trace", std::vector<std::string>()),
+          .back_trace_end = json.value("back_trace_end", std::string())};
 }
 
 std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
   return failure(ErrorCode::corrupt, fmt::format("{}: {}", path, what));
+}
+
+// The page that it is of may be overwritten.
+std::vector<std::string> addresses_of(const BackTrace& trace) {
+  std::vector<std::string> texts;
+  const std::size_t count = std::min<std::size_t>(trace.count, BackTrace::kMost);
+  for (const std::uint64_t address : std::span(trace.addresses).first(count)) {
+    texts.push_back(fmt::format("{:#x}", address));
+  }
+  return texts;
 }
 
 // Without a time nothing is known to be the same.
@@ -88,7 +102,9 @@ ExceptionEntry exception_entry(const FaultRecord& record, std::string_view appli
           .address = record.address,
           .symbol = {},
           .memory_address = of_memory ? record.memory_address : 0,
-          .text = describe_fault(record)};
+          .text = describe_fault(record),
+          .back_trace = addresses_of(record.back_trace),
+          .back_trace_end = describe_end(record.back_trace)};
 }
 
 std::string exception_path(std::string_view run_directory, std::string_view instance) {
@@ -129,7 +145,9 @@ Result<std::string> keep_exceptions(const std::string& path, std::span<const Exc
     remark = fmt::format("the exceptions before this one are lost: {}", history.error().describe());
     history = ExceptionHistory{};
   }
+  const ExceptionHistory before = *history;
   for (const ExceptionEntry& entry : found) history->add(entry);
+  if (*history == before) return remark;
   PLCHOST_TRY(write_exceptions(path, *history));
   return remark;
 }

@@ -24,6 +24,9 @@ struct ExceptionEntry {
   std::string symbol;                ///< "fill(int)+0x12 in bottling.so"; empty: not known
   std::uint64_t memory_address = 0;  ///< the address of SIGSEGV and SIGBUS
   std::string text;                  ///< the cause, with its figures
+  /// Of its functions each as `symbol` has it, the innermost first; "0x7f12" where no file is known.
+  std::vector<std::string> back_trace;
+  std::string back_trace_end;  ///< why there are no more; empty: it is whole
   bool operator==(const ExceptionEntry&) const = default;
 };
 
@@ -38,9 +41,10 @@ struct ExceptionHistory {
   /// Numbers it and drops the oldest, if there are too many. Of one that is there already, by its task and
   /// time, the one with a symbol stays: the manager, which finds none, may have come first, or come last.
   void add(ExceptionEntry entry);
+  bool operator==(const ExceptionHistory&) const = default;
 };
 
-/// Without its symbol, which only the process can find.
+/// Without symbols, which only the process can find: its back-trace has addresses.
 [[nodiscard]] ExceptionEntry exception_entry(const FaultRecord& record, std::string_view application,
                                              std::string_view task);
 
@@ -51,8 +55,8 @@ struct ExceptionHistory {
 [[nodiscard]] Result<ExceptionHistory> read_exceptions(const std::string& path);
 /// Replaces the file as a whole: a reader finds the one before or the new one. Set-up.
 [[nodiscard]] Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history);
-/// Adds to the file what was found. A file that cannot be read is begun anew: then the remark says what was
-/// lost; else it is empty. Set-up.
+/// Adds to the file what was found; if it has all of it already, it stays as it is. A file that cannot be
+/// read is begun anew: then the remark says what was lost; else it is empty. Set-up.
 [[nodiscard]] Result<std::string> keep_exceptions(const std::string& path,
                                                   std::span<const ExceptionEntry> found);
 /// The same for an instance, whether it says so itself or its manager does. The log says what is lost.

@@ -1,4 +1,6 @@
 #include <memory>
+#include <sstream>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -10,6 +12,7 @@
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -105,6 +108,17 @@ int show_task(CliSession& session, const std::string& name) {
   return task ? show_statistics(session, *task) : CliSession::fail(task.error());
 }
 
+// The functions of a back-trace, each on a line with its number.
+std::string format_back_trace(const std::string& functions) {
+  std::string text;
+  std::istringstream lines(functions);
+  std::string function;
+  for (int number = 0; std::getline(lines, function); ++number) {
+    text += fmt::format("  #{:<2} {}\n", number, printable(function));
+  }
+  return text.empty() ? text : "back_trace\n" + text;
+}
+
 // For people: no field that says nothing, addresses as tools print them.
 std::string format_exception(Row row) {
   for (const char* field : {"address", "memory_address"}) {
@@ -112,11 +126,13 @@ std::string format_exception(Row row) {
     row[field] = address != 0 ? fmt::format("{:#x}", address) : "";
   }
   row.erase("time_unix_ns");
+  const auto back_trace = row["back_trace"].get<std::string>();
+  row.erase("back_trace");
   Row said;
   for (const auto& [field, value] : row.items()) {
     if (!value.is_string() || !value.get_ref<const std::string&>().empty()) said[field] = value;
   }
-  return format_fields(said);
+  return format_fields(said) + format_back_trace(back_trace);
 }
 
 int show_exception(CliSession& session, const std::string& name) {

@@ -1,6 +1,8 @@
 #include "api/server/status/exception_watch.hpp"
 
 #include <algorithm>
+#include <string>
+#include <vector>
 
 #include <code_words.hpp>
 #include <sys/stat.h>
@@ -10,6 +12,21 @@
 #include "shm/log/log.hpp"
 
 namespace plchost {
+
+namespace {
+
+// As many whole lines as there is room for.
+std::string lines_of(const std::vector<std::string>& functions, std::size_t most) {
+  std::string lines;
+  for (const std::string& function : functions) {
+    if (lines.size() + 1 + function.size() > most) break;
+    if (!lines.empty()) lines += '\n';
+    lines += function;
+  }
+  return lines;
+}
+
+}  // namespace
 
 bool ExceptionWatch::follow(const InstanceStatus& instance, const TaskWatch& tasks, TimePoint now) {
   const std::string name(instance.name.view());
@@ -77,6 +94,8 @@ void ExceptionWatch::show(plc_ExceptionStatus& sample, const ExceptionHistory& h
   sample.memory_address = last.memory_address;
   dds::copy_text(sample.text, last.text);
   dds::copy_text(sample.application, last.application);
+  dds::copy_text(sample.back_trace, lines_of(last.back_trace, sizeof sample.back_trace - 1));
+  dds::copy_text(sample.back_trace_end, last.back_trace_end);
 }
 
 }  // namespace plchost

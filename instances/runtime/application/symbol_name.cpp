@@ -81,30 +81,35 @@ std::string file_name(const char* path) {
   return name;
 }
 
-std::vector<char> contents_of(const char* path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 }  // namespace
 
-std::string symbol_name(std::uintptr_t address) {
+const std::vector<char>& SymbolNames::contents_of(const char* path) {
+  const auto known = files_.find(std::string_view(path));
+  if (known != files_.end()) return known->second;
+  std::ifstream file(path, std::ios::binary);
+  std::vector<char> contents{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return files_.emplace(path, std::move(contents)).first->second;
+}
+
+std::string SymbolNames::at(std::uintptr_t address, bool returned_to) {
+  const std::uintptr_t looked_at = returned_to && address != 0 ? address - 1 : address;
   Dl_info info{};
   // NOLINTNEXTLINE(performance-no-int-to-ptr): it is an address
-  if (address == 0 || ::dladdr(reinterpret_cast<const void*>(address), &info) == 0 ||
+  if (looked_at == 0 || ::dladdr(reinterpret_cast<const void*>(looked_at), &info) == 0 ||
       info.dli_fname == nullptr)
     return {};
   const std::string file = file_name(info.dli_fname);
-  const auto in_file = address - reinterpret_cast<std::uintptr_t>(info.dli_fbase);
-  const std::vector<char> bytes = contents_of(info.dli_fname);
-  if (const auto function = function_at(std::as_bytes(std::span(bytes)), in_file)) {
-    return printable(fmt::format("{}+{:#x} in {}", function->name, function->offset, file));
+  const auto base = reinterpret_cast<std::uintptr_t>(info.dli_fbase);
+  const std::uintptr_t behind = address - looked_at;
+  if (const auto function =
+          function_at(std::as_bytes(std::span(contents_of(info.dli_fname))), looked_at - base)) {
+    return printable(fmt::format("{}+{:#x} in {}", function->name, function->offset + behind, file));
   }
   if (info.dli_sname != nullptr) {
     const auto offset = address - reinterpret_cast<std::uintptr_t>(info.dli_saddr);
     return printable(fmt::format("{}+{:#x} in {}", demangled(info.dli_sname), offset, file));
   }
-  return printable(fmt::format("{}+{:#x}", file, in_file));
+  return printable(fmt::format("{}+{:#x}", file, address - base));
 }
 
 std::string with_readable_symbols(std::string_view text) {

@@ -1,6 +1,7 @@
 // The actions of an Instance when one of its tasks has a fault.
 
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -18,9 +19,14 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
   const FaultRecord& record = fault.record;
   ExceptionEntry entry = exception_entry(record, application, fault.name);
   entry.whole_application = fault.whole_application;
-  entry.symbol = symbol_name(record.address);
+  SymbolNames names;
+  entry.symbol = names.at(record.address);
   if (entry.symbol.empty() && record.caller != 0) {
-    entry.symbol = fmt::format("no code; called from {}", symbol_name(record.caller));
+    entry.symbol = fmt::format("no code; called from {}", names.at(record.caller));
+  }
+  for (std::size_t i = 0; i < entry.back_trace.size(); ++i) {
+    std::string name = names.at(record.back_trace.addresses[i], i > 0);
+    if (!name.empty()) entry.back_trace[i] = std::move(name);
   }
   return entry;
 }

@@ -113,11 +113,14 @@ TEST_F(ClientLibrary, ShowsExceptionsAndApplicationsAndTellsOfEach) {
                .signal = "SIGFPE",
                .address = 0x7f0012345678,
                .symbol = "divide()+0x12 in line.so",
-               .text = "integer division by zero"});
+               .text = "integer division by zero",
+               .back_trace = {"divide(int, int)+0x12 in line.so", "fill()+0x7 in line.so"},
+               .back_trace_end = {}});
   ASSERT_TRUE(write_exceptions(path, history));
   const Client::Exception exception = told.get_future().get();
   EXPECT_EQ(exception.task, "Main");
   EXPECT_EQ(exception.signal, "SIGFPE");
+  EXPECT_EQ(exception.back_trace, history.entries.back().back_trace) << "a list of its own";
   EXPECT_EQ(exception.time.time_since_epoch(), std::chrono::nanoseconds(1'789'000'000'123'456'789));
   EXPECT_EQ(sut.exceptions().front(), exception);
 }

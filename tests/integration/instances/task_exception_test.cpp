@@ -132,6 +132,55 @@ INSTANTIATE_TEST_SUITE_P(
               "integer division by zero or overflow in its event variable", "divide()+0x"}),
     [](const auto& test) { return std::string(test.param.event); });
 
+/// The functions of the application in the back-trace of a fault, the innermost first, and how it ends.
+struct Trace {
+  const char* event;
+  std::vector<std::string> functions;
+  const char* end;
+};
+
+void PrintTo(const Trace& trace, std::ostream* to) {
+  *to << trace.event;
+}
+
+class BackTraceOf : public ::testing::TestWithParam<Trace> {};
+
+TEST_P(BackTraceOf, AFaultNamesTheFunctionsThatLedToIt) {
+  Faulty sut;
+  (void)sut.process().event(GetParam().event).post();
+  const ExceptionEntry found = sut.exceptions().front();
+  std::vector<std::string> own;
+  for (const std::string& function : found.back_trace) {
+    if (function.find("task_faults.so") != std::string::npos) own.push_back(function);
+  }
+  const std::vector<std::string>& expected = GetParam().functions;
+  ASSERT_GE(own.size(), expected.size()) << ::testing::PrintToString(found.back_trace);
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_THAT(own[i], HasSubstr(expected[i]));
+  EXPECT_EQ(found.back_trace_end, GetParam().end) << ::testing::PrintToString(found.back_trace);
+  EXPECT_EQ(::testing::PrintToString(found.back_trace).find("Task::run_cycle"), std::string::npos);
+}
+
+const char* const kDeep = "only the innermost 32 functions are known";
+const char* const kLost =
+    "the caller of the last function is not known: it has no unwind tables, or the stack is overwritten";
+const char* const kDamaged = "the stack is overwritten: it leads to memory that cannot be read";
+
+const std::vector<Trace> kTraces = {{"nested", {"innermost()+0x", "middle()+0x", "outermost()+0x"}, ""},
+                                    {"recurse", std::vector<std::string>(32, "recurse(int)+0x"), kDeep},
+                                    {"alloca", {"overflow_at_once()+0x"}, ""},
+                                    {"abort", {"setup(plc::Application&)"}, ""},
+                                    {"loop", {"loop()+0x"}, ""},
+                                    {"sleep", {"sleep_for_ever()+0x"}, ""},
+                                    {"variable", {"divide()+0x", "setup(plc::Application&)"}, ""},
+                                    {"call_null", {"call_null()+0x"}, ""},
+#if defined(__x86_64__)
+                                    {"lose_frame", {"lose_frame()+0x"}, kDamaged},
+#endif
+                                    {"smash_stack", {"smash_stack()+0x"}, kLost}};
+
+INSTANTIATE_TEST_SUITE_P(Faults, BackTraceOf, ::testing::ValuesIn(kTraces),
+                         [](const auto& test) { return std::string(test.param.event); });
+
 class EachScheduler : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(EachScheduler, StopsALoopInTheFirstCycle) {

@@ -13,6 +13,7 @@
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/pages/exception_history.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/costs_cycles.hpp"
 #include "tests/integration/manager/plant.hpp"
@@ -168,6 +169,8 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   EXPECT_EQ(kept->entries[0].task, "DoubleFree");
   EXPECT_EQ(kept->entries[0].signal, "SIGABRT");
   EXPECT_NE(kept->entries[0].address, 0U);
+  ASSERT_FALSE(kept->entries[0].back_trace.empty());
+  EXPECT_THAT(kept->entries[0].back_trace[0], StartsWith("0x")) << "only the process knows its files";
   EXPECT_GT(kept->entries[0].unix_ns, 0);
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::wrong_state);
   const TimePoint before = MonotonicClock::now();
@@ -175,6 +178,25 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   EXPECT_LT(MonotonicClock::now() - before, kShutdownLimit) << "it cannot be asked to end";
   EXPECT_EQ(plant.status("line1").state, InstanceState::stopped);
   EXPECT_NE(plant.status("line1").pid, pid);
+}
+
+TEST(Manager, KeepsTheExceptionOfAProcessThatEndsBeforeItHasWrittenIt) {
+  if (kSanitized) GTEST_SKIP() << "the sanitizer's own heap ends the process";
+  Plant plant;
+  plant.add("line1", "manager_double_free");
+  plant.start_manager();
+  std::int64_t caught_at = 0;
+  ASSERT_TRUE(Plant::eventually([&] {
+    const auto page = InstancePageReader::open(plant.pool(), "line1");
+    const auto fault = page ? page->fault(0) : std::nullopt;
+    caught_at = fault ? fault->unix_ns : 0;
+    return caught_at != 0;
+  }));
+  kill_process(plant.status("line1").pid);
+  EXPECT_TRUE(Plant::eventually([&] {
+    const auto kept = read_exceptions(exception_path(plant.run_directory(), "line1"));
+    return kept && !kept->entries.empty() && kept->entries[0].unix_ns == caught_at;
+  }));
 }
 
 // The supervision is below that thread, and no signal reaches it: the instance finds it by itself if the

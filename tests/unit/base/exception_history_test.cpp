@@ -22,6 +22,8 @@ class ExceptionHistoryTest : public testing::Test {
     made.signal = "SIGSEGV";
     made.address = 0xffff'ffff'ffff'fff0;
     made.text = std::move(text);
+    made.back_trace = {"fill(int)+0x12 in line.so", "0x7f12"};
+    made.back_trace_end = "only a part is known";
     return made;
   }
 
@@ -39,6 +41,31 @@ TEST_F(ExceptionHistoryTest, ComesBackFromTheFileAsItWasWritten) {
   EXPECT_EQ(back->entries[0].number, 1U);
   EXPECT_EQ(back->entries[0].address, sut.entries[0].address);
   EXPECT_EQ(back->entries[0].task, "Fill");
+  EXPECT_EQ(back->entries[0].back_trace, sut.entries[0].back_trace);
+  EXPECT_EQ(back->entries[0].back_trace_end, "only a part is known");
+}
+
+TEST_F(ExceptionHistoryTest, HasTheAddressesOfABackTraceThatOnlyTheProcessCanName) {
+  FaultRecord record;
+  record.back_trace.addresses = {0x7f12, 0x7f34};
+  record.back_trace.count = 2;
+  record.back_trace.end = BackTrace::End::whole;
+  const ExceptionEntry made = exception_entry(record, "/opt/line.so", "Fill");
+  EXPECT_THAT(made.back_trace, testing::ElementsAre("0x7f12", "0x7f34"));
+  EXPECT_EQ(made.back_trace_end, "");
+  EXPECT_NE(exception_entry({}, "", "").back_trace_end, "") << "there is none";
+  record.back_trace.count = 200;
+  EXPECT_EQ(exception_entry(record, "", "").back_trace.size(), BackTrace::kMost)
+      << "a stranger wrote the page";
+}
+
+// Of a version that had none.
+TEST_F(ExceptionHistoryTest, IsReadWithoutBackTraces) {
+  write(R"({"version":1,"count":1,"exceptions":[{"number":1,"task":"Fill"}]})");
+  const auto history = read_exceptions(path_);
+  ASSERT_TRUE(history);
+  EXPECT_EQ(history->entries[0].task, "Fill");
+  EXPECT_TRUE(history->entries[0].back_trace.empty());
 }
 
 TEST_F(ExceptionHistoryTest, KeepsTheLastSixteenAndCountsAll) {
@@ -75,6 +102,17 @@ TEST_F(ExceptionHistoryTest, IsKeptOnInTheFile) {
   ASSERT_TRUE(history);
   EXPECT_EQ(history->count, 3U);
   EXPECT_EQ(history->entries.back().text, "three");
+}
+
+TEST_F(ExceptionHistoryTest, IsNotWrittenAgainWithoutNews) {
+  ExceptionEntry fault = entry("abort");
+  fault.unix_ns = 1000;
+  fault.symbol = "fill()+0x12";
+  ASSERT_TRUE(keep_exceptions(path_, std::vector{fault}));
+  const auto written = std::filesystem::last_write_time(path_);
+  fault.symbol = "";  // by the manager
+  ASSERT_TRUE(keep_exceptions(path_, std::vector{fault}));
+  EXPECT_EQ(std::filesystem::last_write_time(path_), written);
 }
 
 TEST_F(ExceptionHistoryTest, BeginsAnewWhereTheFileIsSomethingElseAndSaysSo) {

@@ -46,6 +46,23 @@ __attribute__((noinline)) void call_null() {
   function();
   sink = 1;
 }
+__attribute__((noinline)) void innermost() {
+  *nowhere = 2;  // unlike that of another function, which would be the same one then
+}
+__attribute__((noinline)) void middle() {
+  innermost();
+  sink = 1;  // behind the call, so that it is none that never comes back
+}
+__attribute__((noinline)) void outermost() {
+  middle();
+  sink = 2;
+}
+// Writes over its own return address, by one where no code is, and has a fault then.
+__attribute__((noinline)) void smash_stack() {
+  auto* const frame = static_cast<volatile std::uintptr_t*>(__builtin_frame_address(0));
+  for (int i = 0; i < 8; ++i) frame[i] = reinterpret_cast<std::uintptr_t>(&sink);
+  *nowhere = 3;
+}
 __attribute__((noinline)) int recurse(int depth) {  // NOLINT(misc-no-recursion): that is the fault
   if (zero != 0) return 0;
   volatile char frame[512];
@@ -108,8 +125,16 @@ __attribute__((noinline)) void write_wild() {
 void break_in_a_thread() {
   std::thread([] { __asm__("int3"); }).join();
 }
+// Its caller is found by the register for frames, which points to no memory.
+__attribute__((noinline)) void lose_frame() {
+  auto* const block = static_cast<volatile char*>(alloca(static_cast<std::size_t>(sink) + 64));
+  block[0] = 1;
+  __asm__ volatile("mov $64, %%rbp\n\tmovl $1, (%%rbp)" : : : "memory");
+  sink = block[0];
+}
 #else
 void write_wild() {}
+void lose_frame() {}
 void break_in_a_thread() {}
 #endif
 
@@ -135,6 +160,12 @@ void setup(plc::Application& app) {
   app.external("ReadNull", 4, "read_null", read_null);
   app.external("WriteNull", 4, "write_null", write_null);
   app.external("CallNull", 4, "call_null", call_null);
+  app.external("Nested", 4, "nested", [] {
+    outermost();
+    sink = 3;
+  });
+  app.external("SmashStack", 4, "smash_stack", smash_stack);
+  app.external("LoseFrame", 4, "lose_frame", lose_frame);
   app.external("Recurse", 4, "recurse", [] { sink = recurse(0); });
   app.external("Alloca", 4, "alloca", overflow_at_once);
   app.external("Abort", 4, "abort", [] { std::abort(); });
