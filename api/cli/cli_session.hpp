@@ -100,6 +100,7 @@ void add_verify_verb(const Command& plcctl, CliSession& session);
 void add_debug_verb(const Command& plcctl, CliSession& session);
 void add_build_verb(const Command& plcctl, CliSession& session);
 void add_export_verb(const Command& plcctl, CliSession& session, const std::string& version);
+void add_save_verb(const Command& plcctl, CliSession& session, const std::string& version);
 void add_completion_verb(const Command& plcctl);
 
 /// " (did you mean 'x'?)", or nothing if no name is near.

@@ -219,6 +219,7 @@ int main(int argc, char** argv) {
   plchost::add_debug_verb(plcctl, session);
   plchost::add_build_verb(plcctl, session);
   plchost::add_export_verb(plcctl, session, PLCHOST_VERSION);
+  plchost::add_save_verb(plcctl, session, PLCHOST_VERSION);
   plchost::add_completion_verb(plcctl);
   const std::vector<std::string> words(argv + 1, argv + argc);
   plchost::start_log("plcctl", "warning");

@@ -72,17 +72,13 @@ Result<std::vector<plc_Transition>> collect(CliSession& session, const Transitio
 }
 
 int list_transitions(CliSession& session, const TransitionArguments& arguments) {
-  auto collected = collect(session, arguments);
-  if (!collected) return CliSession::fail(collected.error());
-  std::vector<plc_Transition>& found = *collected;
-  if (found.empty() && !arguments.instance.empty()) {
+  const auto rows = transition_rows(session, arguments.instance);
+  if (!rows) return CliSession::fail(rows.error());
+  if (rows->empty() && !arguments.instance.empty()) {
     if (const auto known = session.check_instance(arguments.instance); !known)
       return CliSession::fail(known.error());
   }
-  std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
-  std::vector<Row> rows;
-  for (const plc_Transition& sample : found) rows.push_back(to_row(sample));
-  return session.show(rows, columns_of<plc_Transition>());
+  return session.show(*rows, columns_of<plc_Transition>());
 }
 
 void print(const CliSession& session, const TransitionView& view) {
@@ -118,6 +114,14 @@ int watch_transitions(CliSession& session, const TransitionArguments& arguments)
 }
 
 }  // namespace
+
+Result<std::vector<Row>> transition_rows(CliSession& session, const std::string& instance) {
+  PLCHOST_TRY_ASSIGN(auto found, collect(session, {.instance = instance}));
+  std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
+  std::vector<Row> rows;
+  for (const plc_Transition& sample : found) rows.push_back(to_row(sample));
+  return rows;
+}
 
 void add_list_transitions(const Command& verb, CliSession& session) {
   const auto arguments = std::make_shared<TransitionArguments>();

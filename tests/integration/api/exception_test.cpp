@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "shm/pages/exception_history.hpp"
 #include "tests/integration/api/test_host.hpp"
@@ -38,7 +39,9 @@ class ExceptionOfAnInstance : public testing::Test {
                  .signal = "SIGFPE",
                  .address = 0x7f0012345678,
                  .symbol = "divide()+0x12 in line.so",
-                 .text = "integer division by zero"});
+                 .text = "integer division by zero",
+                 .back_trace = {"divide()+0x12 in line.so", "fill()+0x7 in line.so"},
+                 .back_trace_end = "only a part is known"});
     ASSERT_TRUE(write_exceptions(path(), history));
   }
   std::optional<plc_ExceptionStatus> shown(const std::string& instance) {
@@ -78,6 +81,8 @@ TEST_F(ExceptionOfAnInstance, IsShownWithAllThatIsKnown) {
   EXPECT_EQ(seen.address, 0x7f0012345678U);
   EXPECT_EQ(seen.time_unix_ns, 1'789'000'000'123'456'789);
   EXPECT_TRUE(seen.whole_application);
+  EXPECT_STREQ(seen.back_trace, "divide()+0x12 in line.so\nfill()+0x7 in line.so");
+  EXPECT_STREQ(seen.back_trace_end, "only a part is known");
   EXPECT_EQ(shown("line2")->count, 0U);
   add("Label");
   ASSERT_TRUE(eventually_shown(2));
@@ -161,6 +166,10 @@ TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
   EXPECT_EQ(text.code, 0) << text.errors;
   EXPECT_THAT(text.output, AllOf(HasSubstr("Fill"), HasSubstr("SIGFPE"), HasSubstr("0x7f0012345678"),
                                  HasSubstr("divide()+0x12"), HasSubstr("2026-09-10T"), HasSubstr(".123Z")));
+  EXPECT_THAT(text.output, HasSubstr("back_trace_end  only a part is known\n"
+                                     "back_trace\n"
+                                     "  #0  divide()+0x12 in line.so\n"
+                                     "  #1  fill()+0x7 in line.so\n"));
   EXPECT_THAT(text.output, Not(HasSubstr("memory_address"))) << "nothing is known of it";
   const auto json = nlohmann::json::parse(run({"show", "exception", "line1", "--json"}).output);
   ASSERT_EQ(json.size(), 1U);
@@ -168,10 +177,55 @@ TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
   EXPECT_EQ(json[0]["address"], 0x7f0012345678);
   EXPECT_EQ(json[0]["time_unix_ns"], 1'789'000'000'123'456'789);
   EXPECT_EQ(json[0]["stopped"], "application");
+  EXPECT_EQ(json[0]["back_trace"], "divide()+0x12 in line.so\nfill()+0x7 in line.so");
   const auto list = nlohmann::json::parse(run({"list", "exceptions", "--json"}).output);
   ASSERT_EQ(list.size(), 1U) << "line2 never had any";
   EXPECT_EQ(list[0]["instance"], "line1");
   EXPECT_THAT(run({"list", "exceptions"}).output, HasSubstr("integer division by zero"));
+}
+
+TEST_F(ExceptionOfAnInstance, HasAsManyWholeFunctionsAsThereIsRoomFor) {
+  ExceptionEntry entry;
+  entry.task = "Fill";
+  entry.back_trace.assign(32, std::string(400, 'x'));
+  ExceptionHistory history;
+  history.add(entry);
+  ASSERT_TRUE(write_exceptions(path(), history));
+  ASSERT_TRUE(eventually_shown(1));
+  const std::string lines = shown("line1")->back_trace;
+  EXPECT_EQ(lines.size(), 10 * 401U - 1);
+}
+
+TEST_F(ExceptionOfAnInstance, IsInTheReport) {
+  add("Fill");
+  ASSERT_TRUE(eventually_shown(1));
+  const std::string file = path() + ".report.json";
+  const auto saved = run({"save", "report", "line1", file});
+  ASSERT_EQ(saved.code, 0) << saved.errors;
+  struct stat status{};
+  ASSERT_EQ(::stat(file.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0600U);
+  const auto report = nlohmann::json::parse(std::ifstream(file));
+  EXPECT_EQ(report["report"], 1);
+  EXPECT_EQ(report["host"]["host"], "hosta");
+  EXPECT_NE(report["host"]["version"], "");
+  ASSERT_EQ(report["instance"].size(), 1U) << "line2 is none of its";
+  EXPECT_EQ(report["instance"][0]["name"], "line1");
+  ASSERT_EQ(report["exception"].size(), 1U);
+  EXPECT_EQ(report["exception"][0]["task"], "Fill");
+  for (const char* const part : {"applications", "tasks", "events", "transitions"}) {
+    EXPECT_TRUE(report[part].is_array()) << part;
+  }
+  // No manager is here to answer for its part.
+  for (const char* const part : {"findings", "log"}) {
+    const bool told = saved.output.find(std::string(part) + ": ") != std::string::npos;
+    EXPECT_NE(report.contains(part), told) << saved.output;
+  }
+  std::filesystem::remove(file);
+  const auto unknown = run({"save", "report", "line3", file});
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_THAT(unknown.errors, HasSubstr("no instance 'line3'"));
+  EXPECT_FALSE(std::filesystem::exists(file));
 }
 
 TEST_F(ExceptionOfAnInstance, ThatNeverWasIsNoErrorButAnUnknownInstanceIs) {

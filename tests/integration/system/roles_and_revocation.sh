@@ -34,6 +34,15 @@ refused "the permissions of this identity do not allow it" as anna rollback appl
 as otto load application packer1 "$APPLICATIONS/packer.so" >/dev/null || fail "an engineer may send an application"
 is "$(as panel list applications --json | jq -r '.[0].by')" "engineer otto" || fail "$(as panel list applications)"
 pid=$(as panel list instances --json | jq -r '.[0].pid')
+echo "- a report has no secret; that of a viewer says that the log is missing"
+as otto save report packer1 "$cell/report.json" >/dev/null || fail "no report"
+is "$(jq -r '.instance[0].name, .missing[]' "$cell/report.json")" packer1 || fail "$(jq .missing "$cell/report.json")"
+[ "$(jq '.log | length' "$cell/report.json")" -gt 0 ] || fail "the report has no log"
+secrets() { find "$plant" -name '*.pem' -exec cat {} + | grep -v -e '-----' | grep . ; }
+[ "$(secrets | wc -l)" -gt 20 ] || fail "the plant has no secrets"
+! grep -qF -e PRIVATE -f <(secrets) "$cell/report.json" || fail "the report has a secret"
+as panel save report packer1 "$cell/viewer.json" >/dev/null || fail "no report for a viewer"
+jq -r '.missing[]' "$cell/viewer.json" | grep -q '^log: ' || fail "$(jq .missing "$cell/viewer.json")"
 code=0
 plcctl --timeout 2 list hosts 2>"$cell/unknown.txt" || code=$?
 is "$code" 3 || fail "exit code $code without an identity"
