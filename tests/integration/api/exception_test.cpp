@@ -200,7 +200,7 @@ TEST_F(ExceptionOfAnInstance, IsInTheReport) {
   add("Fill");
   ASSERT_TRUE(eventually_shown(1));
   const std::string file = path() + ".report.json";
-  const auto saved = run({"save", "report", "line1", file});
+  const auto saved = run({"--timeout", "2", "save", "report", "line1", file});
   ASSERT_EQ(saved.code, 0) << saved.errors;
   struct stat status{};
   ASSERT_EQ(::stat(file.c_str(), &status), 0);
