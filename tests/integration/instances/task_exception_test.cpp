@@ -160,23 +160,22 @@ TEST_P(BackTraceOf, AFaultNamesTheFunctionsThatLedToIt) {
   EXPECT_EQ(::testing::PrintToString(found.back_trace).find("Task::run_cycle"), std::string::npos);
 }
 
-const char* const kDeep = "only the innermost 32 functions are known";
-const char* const kLost =
-    "the caller of the last function is not known: it has no unwind tables, or the stack is overwritten";
-const char* const kDamaged = "the stack is overwritten: it leads to memory that cannot be read";
-
-const std::vector<Trace> kTraces = {{"nested", {"innermost()+0x", "middle()+0x", "outermost()+0x"}, ""},
-                                    {"recurse", std::vector<std::string>(32, "recurse(int)+0x"), kDeep},
-                                    {"alloca", {"overflow_at_once()+0x"}, ""},
-                                    {"abort", {"setup(plc::Application&)"}, ""},
-                                    {"loop", {"loop()+0x"}, ""},
-                                    {"sleep", {"sleep_for_ever()+0x"}, ""},
-                                    {"variable", {"divide()+0x", "setup(plc::Application&)"}, ""},
-                                    {"call_null", {"call_null()+0x"}, ""},
-#if defined(__x86_64__)
-                                    {"lose_frame", {"lose_frame()+0x"}, kDamaged},
+const std::vector<Trace> kTraces = {
+    {"nested", {"innermost()+0x", "middle()+0x", "outermost()+0x"}, ""},
+    {"recurse", std::vector<std::string>(32, "recurse(int)+0x"), "only the innermost 32 functions are known"},
+    {"alloca", {"overflow_at_once()+0x"}, ""},
+    {"abort", {"setup(plc::Application&)"}, ""},
+    {"loop", {"loop()+0x"}, ""},
+    {"sleep", {"sleep_for_ever()+0x"}, ""},
+    {"variable", {"divide()+0x", "setup(plc::Application&)"}, ""},
+    {"call_null", {"call_null()+0x"}, ""},
+#if defined(__x86_64__)  // which has return addresses on the stack only
+    {"smash_stack",
+     {"smash_stack()+0x"},
+     "the caller of the last function is not known: it has no unwind tables, or the stack is overwritten"},
+    {"lose_frame", {"lose_frame()+0x"}, "the stack is overwritten: it leads to memory that cannot be read"},
 #endif
-                                    {"smash_stack", {"smash_stack()+0x"}, kLost}};
+};
 
 INSTANTIATE_TEST_SUITE_P(Faults, BackTraceOf, ::testing::ValuesIn(kTraces),
                          [](const auto& test) { return std::string(test.param.event); });
