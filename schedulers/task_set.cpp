@@ -191,6 +191,7 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
     return Fault{.task = i,
                  .name = tasks_[i]->config().name,
                  .record = *record,
+                 .back_trace = tasks_[i]->fault().back_trace(),
                  .whole_application = fault_board_.halted()};
   }
   return std::nullopt;

@@ -190,6 +190,7 @@ class TaskSet {
     std::size_t task = 0;  ///< its index
     std::string name;
     FaultRecord record;
+    BackTrace back_trace;
     bool whole_application = true;  ///< false: the policy is `task`, the others run on
   };
   /// Readable when take_fault() has something new. Valid as long as this object.

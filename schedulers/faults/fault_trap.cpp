@@ -207,8 +207,8 @@ struct FaultHandlers {
 
   static void trace(TaskFault& fault, const FaultTrap& trap, void* context) noexcept {
     fault.show();  // the walk may end the process
-    FaultRecord& record = fault.record();
-    StackWalk::walk(record.back_trace, *static_cast<ucontext_t*>(context), trap.bottom_, record.caller);
+    StackWalk::walk(fault.back_trace(), *static_cast<ucontext_t*>(context), trap.bottom_,
+                    fault.record().caller);
   }
 
   // All signals are blocked in the handlers, so nothing brings the thread back.

@@ -52,6 +52,9 @@ class TaskFault {
   /// Any context, signal handlers included. `whole_application`: under any policy.
   [[nodiscard]] bool claim(bool whole_application = false) noexcept;
   [[nodiscard]] FaultRecord& record() noexcept { return record_; }
+  /// Of the process only: others could name none of its functions.
+  [[nodiscard]] BackTrace& back_trace() noexcept { return back_trace_; }
+  [[nodiscard]] const BackTrace& back_trace() const noexcept { return back_trace_; }
   /// Shows the record as far as it is known, before anything that may end the process.
   void show() noexcept;
   void publish() noexcept;
@@ -72,6 +75,7 @@ class TaskFault {
   WatchdogPolicy policy_;
   std::atomic<State> state_{State::none};
   FaultRecord record_;
+  BackTrace back_trace_;
   Seqlock<FaultRecord>* shown_ = nullptr;
 };
 

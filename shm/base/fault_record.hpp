@@ -71,7 +71,6 @@ struct FaultRecord {
   std::int64_t unix_ns = 0;              ///< CLOCK_REALTIME
   FixedText<kMaxText> text;              ///< cpp_exception: its what(); no_processor: the thread
   FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
-  BackTrace back_trace;
 };
 
 /// In words: the cause, with its figures. Without addresses, which only the process can name.

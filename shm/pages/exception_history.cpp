@@ -58,16 +58,6 @@ std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
   return failure(ErrorCode::corrupt, fmt::format("{}: {}", path, what));
 }
 
-// The page that it is of may be overwritten.
-std::vector<std::string> addresses_of(const BackTrace& trace) {
-  std::vector<std::string> texts;
-  const std::size_t count = std::min<std::size_t>(trace.count, BackTrace::kMost);
-  for (const std::uint64_t address : std::span(trace.addresses).first(count)) {
-    texts.push_back(fmt::format("{:#x}", address));
-  }
-  return texts;
-}
-
 // Without a time nothing is known to be the same.
 bool same(const ExceptionEntry& one, const ExceptionEntry& other) {
   return one.unix_ns != 0 && one.unix_ns == other.unix_ns && one.task == other.task;
@@ -103,8 +93,8 @@ ExceptionEntry exception_entry(const FaultRecord& record, std::string_view appli
           .symbol = {},
           .memory_address = of_memory ? record.memory_address : 0,
           .text = describe_fault(record),
-          .back_trace = addresses_of(record.back_trace),
-          .back_trace_end = describe_end(record.back_trace)};
+          .back_trace = {},
+          .back_trace_end = "only its process knew it, and could not tell it any more"};
 }
 
 std::string exception_path(std::string_view run_directory, std::string_view instance) {

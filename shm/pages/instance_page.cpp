@@ -19,10 +19,10 @@ namespace {
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
 /// 8: why a reference record is not followed. 9: faults. 10: the post that was run.
 /// 11: why retain variables are not written. 13: the last loss of cycles.
-/// 14: variables and forces. 15: back-traces of faults.
+/// 14: variables and forces.
 constexpr PageKind kInstancePageKind{.what = "page of an instance",
                                      .magic = 0x67617074'736e6970,  // "pinstpag"
-                                     .version = 15};
+                                     .version = 14};
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);

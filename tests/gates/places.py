@@ -172,7 +172,7 @@ def command(scratch):
 
 def histogram(scratch):
     scratch.plant("shm/base/task_statistics.hpp", "  count,\n};", "  planted,\n", before=True)
-    scratch.plant("shm/pages/instance_page.cpp", ".version = 15}", ".version = 16}", instead=True)
+    scratch.plant("shm/pages/instance_page.cpp", ".version = 14}", ".version = 15}", instead=True)
     scratch.plant("schedulers/tasks/task_recorder.cpp", "statistics_[TaskHistogram::execution].record(cycle.end - cycle.start);",
                   "\n    statistics_[TaskHistogram::planted].record(cycle.spun);")
     scratch.plant("api/control.idl", "DurationHistogram jitter_positive_histogram;  // and of the rest",

@@ -24,10 +24,12 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
   if (entry.symbol.empty() && record.caller != 0) {
     entry.symbol = fmt::format("no code; called from {}", names.at(record.caller));
   }
-  for (std::size_t i = 0; i < entry.back_trace.size(); ++i) {
-    std::string name = names.at(record.back_trace.addresses[i], i > 0);
-    if (!name.empty()) entry.back_trace[i] = std::move(name);
+  for (std::size_t i = 0; i < fault.back_trace.count; ++i) {
+    const std::uint64_t address = fault.back_trace.addresses[i];
+    std::string name = names.at(address, i > 0);
+    entry.back_trace.push_back(name.empty() ? fmt::format("{:#x}", address) : std::move(name));
   }
+  entry.back_trace_end = describe_end(fault.back_trace);
   return entry;
 }
 

@@ -169,8 +169,8 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   EXPECT_EQ(kept->entries[0].task, "DoubleFree");
   EXPECT_EQ(kept->entries[0].signal, "SIGABRT");
   EXPECT_NE(kept->entries[0].address, 0U);
-  ASSERT_FALSE(kept->entries[0].back_trace.empty());
-  EXPECT_THAT(kept->entries[0].back_trace[0], StartsWith("0x")) << "only the process knows its files";
+  EXPECT_TRUE(kept->entries[0].back_trace.empty());
+  EXPECT_THAT(kept->entries[0].back_trace_end, StartsWith("only its process knew it"));
   EXPECT_GT(kept->entries[0].unix_ns, 0);
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::wrong_state);
   const TimePoint before = MonotonicClock::now();
