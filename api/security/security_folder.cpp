@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <utility>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "api/security/folder_files.hpp"
@@ -16,6 +18,7 @@
 #include "api/security/policy.hpp"
 #include "api/security/signed_document.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/system_call.hpp"
 #include "shm/files/replace_file.hpp"
 
 namespace plchost::security {
@@ -30,6 +33,40 @@ constexpr std::time_t kDay = 86'400;
 Result<void> rename_path(const std::string& from, const std::string& to) {
   if (::rename(from.c_str(), to.c_str()) == 0) return {};
   return failure(ErrorCode::system, fmt::format("cannot rename {} to {}", from, to), errno);
+}
+
+// For good, and at once: both are whole folders, before and after it.
+Result<void> exchange_folders(const std::string& fresh, const std::string& old) {
+  PLCHOST_TRY(sync_directory(fresh));
+  PLCHOST_TRY(check_errno(::renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, old.c_str(), RENAME_EXCHANGE),
+                          fmt::format("cannot exchange {} and {}", fresh, old)));
+  return sync_directory(fs::path(old).parent_path());
+}
+
+// As it is, with all files; those that are replaced in the copy stay as they are in the original.
+Result<void> copy_folder(const std::string& from, const std::string& to) {
+  std::error_code error;
+  constexpr auto kOptions =
+      fs::copy_options::recursive | fs::copy_options::create_hard_links | fs::copy_options::copy_symlinks;
+  fs::copy(from, to, kOptions, error);
+  if (error) return failure(ErrorCode::system, fmt::format("cannot copy {}", from), error.value());
+  const auto give_owner = [](const std::string& original, const std::string& copy) -> Result<void> {
+    struct stat status{};
+    PLCHOST_TRY(check_errno(::stat(original.c_str(), &status), "cannot examine " + original));
+    PLCHOST_TRY(check_errno(::chown(copy.c_str(), status.st_uid, status.st_gid), "cannot give " + copy));
+    PLCHOST_TRY(
+        check_errno(::chmod(copy.c_str(), status.st_mode & ALLPERMS), "cannot set the rights of " + copy));
+    return {};
+  };
+  PLCHOST_TRY(give_owner(from, to));
+  for (fs::recursive_directory_iterator at(from, error), end; !error && at != end; at.increment(error)) {
+    if (!at->is_directory(error) || at->is_symlink(error)) continue;
+    const std::string copy = to + at->path().string().substr(from.size());
+    PLCHOST_TRY(give_owner(at->path(), copy));
+    PLCHOST_TRY(sync_directory(copy));
+  }
+  if (error) return failure(ErrorCode::system, "cannot read " + from, error.value());
+  return {};
 }
 
 Result<void> write_authority(const Authority& authority, const std::string& folder,
@@ -129,6 +166,11 @@ std::string SecurityFolder::path(std::string_view name) const {
   return file_in(folder_, name);
 }
 
+// Names do not begin with a dot.
+std::string SecurityFolder::fresh_folder(std::string_view name) const {
+  return path(fmt::format(".{}{}", name, kFreshFolder));
+}
+
 std::string SecurityFolder::authority_file(std::string_view name) const {
   return file_in(path(kAuthoritiesFolder), name);
 }
@@ -139,6 +181,7 @@ Result<void> SecurityFolder::add(Role role, const std::string& name, int days) {
 }
 
 Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& validity) {
+  PLCHOST_TRY(finish_earlier());
   const std::string& name = subject.name;
   PLCHOST_TRY(check_name("identity", name, kMaxIdentityName));
   if (name == kAuthoritiesFolder) {
@@ -156,34 +199,42 @@ Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& v
                                  to_string(known.subject.role)));
     }
   }
-  // Names do not begin with a dot.
-  const std::string fresh = path(fmt::format(".{}.new", name));
-  fs::remove_all(fresh, error);
+  const std::string fresh = fresh_folder(name);
   Unfinished unfinished(fresh);
   PLCHOST_TRY(make_folder(fresh));
   PLCHOST_TRY(copy_common(fresh));
   PLCHOST_TRY(write_identity(fresh, subject, validity));
-  if (is_there) fs::remove_all(path(name), error);
-  PLCHOST_TRY(rename_path(fresh, path(name)));
-  unfinished.finished();
   if (subject.role == Role::host) {
-    PLCHOST_TRY(know_all(name));
+    PLCHOST_TRY(know_all(file_in(fresh, kKnownFolder)));
   }
-  PLCHOST_TRY(tell_hosts(subject));
-  return sync_directory(folder_);
+  if (is_there) {
+    PLCHOST_TRY(exchange_folders(fresh, path(name)));  // the old one goes with `unfinished`
+  } else {
+    PLCHOST_TRY(sync_directory(fresh));
+    PLCHOST_TRY(rename_path(fresh, path(name)));
+    unfinished.finished();
+    PLCHOST_TRY(sync_directory(folder_));
+  }
+  return tell_hosts(name);
 }
 
 Result<void> SecurityFolder::renew(const std::string& name, int days) {
   PLCHOST_TRY(check_days(days));
+  PLCHOST_TRY(finish_earlier());
   PLCHOST_TRY_ASSIGN(const auto known, view(name));
   if (known.revoked) {
     return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked; add it anew", name));
   }
-  PLCHOST_TRY(write_identity(path(name), known.subject, validity_for(days)));
-  return tell_hosts(known.subject);
+  const std::string fresh = fresh_folder(name);
+  const Unfinished removed_at_the_end(fresh);  // then it is the old one
+  PLCHOST_TRY(copy_folder(path(name), fresh));
+  PLCHOST_TRY(write_identity(fresh, known.subject, validity_for(days)));
+  PLCHOST_TRY(exchange_folders(fresh, path(name)));
+  return tell_hosts(name);
 }
 
 Result<void> SecurityFolder::revoke(const std::string& name) {
+  PLCHOST_TRY(finish_earlier());
   PLCHOST_TRY_ASSIGN(const auto known, view(name));
   if (known.revoked) return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked already", name));
   PLCHOST_TRY_ASSIGN(auto certificates, issued(name));

@@ -33,7 +33,7 @@ class SecurityFolder {
   /// A key, certificate and permissions for a name that is new, or revoked. already_exists: it is neither.
   [[nodiscard]] Result<void> add(Role role, const std::string& name, int days = kDaysOfIdentity);
   /// The same role and name with a fresh key and certificate; the old one stays valid until it ends, or until
-  /// the name is revoked.
+  /// the name is revoked. In one step: if this process is ended, key and certificate belong together.
   /// wrong_state: it is revoked.
   [[nodiscard]] Result<void> renew(const std::string& name, int days = kDaysOfIdentity);
   /// All certificates that were ever made for that name are worth nothing from now on, in every folder that
@@ -53,6 +53,8 @@ class SecurityFolder {
         permissions_(std::move(permissions)) {}
 
   [[nodiscard]] std::string path(std::string_view name) const;
+  /// Where the folder of an identity is made, before it gets its name.
+  [[nodiscard]] std::string fresh_folder(std::string_view name) const;
   [[nodiscard]] std::string authority_file(std::string_view name) const;
   [[nodiscard]] Result<IdentityView> view(const std::string& name) const;
   [[nodiscard]] Result<std::vector<std::string>> names() const;
@@ -63,8 +65,10 @@ class SecurityFolder {
   /// All that were made for that name.
   [[nodiscard]] Result<std::vector<Certificate>> issued(const std::string& name) const;
   [[nodiscard]] Result<void> copy_common(const std::string& to) const;
-  [[nodiscard]] Result<void> tell_hosts(const Subject& subject) const;
-  [[nodiscard]] Result<void> know_all(const std::string& host) const;
+  [[nodiscard]] Result<void> tell_hosts(const std::string& identity) const;
+  [[nodiscard]] Result<void> know_all(const std::string& known) const;
+  /// Folders that an earlier command has not brought up to date, because it was cut off.
+  [[nodiscard]] Result<void> finish_earlier() const;
 
   std::string folder_;
   UniqueFd lock_;

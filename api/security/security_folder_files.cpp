@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
+#include <vector>
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -21,6 +22,11 @@ namespace fs = std::filesystem;
 Result<void> write_text(const std::string& path, const Result<std::string>& text, mode_t mode) {
   PLCHOST_TRY_ASSIGN(const auto& contents, text);
   return replace_file(path, contents, mode);
+}
+
+Result<void> renew_text(const std::string& path, const Result<std::string>& text, mode_t mode) {
+  const auto known = read_file(path);
+  return known && text && *known == *text ? Result<void>() : write_text(path, text, mode);
 }
 
 Result<void> make_folder(const std::string& path) {
@@ -93,25 +99,42 @@ Result<void> SecurityFolder::copy_common(const std::string& to) const {
 }
 
 // Hosts know the certificates of all, to know who is behind what was written.
-Result<void> SecurityFolder::tell_hosts(const Subject& subject) const {
+Result<void> SecurityFolder::tell_hosts(const std::string& identity) const {
   PLCHOST_TRY_ASSIGN(const auto all, names());
-  const auto certificate = read_file(file_in(path(subject.name), kCertificateFile));
+  const auto certificate = read_file(file_in(path(identity), kCertificateFile));
   for (const std::string& name : all) {
     const std::string known = file_in(path(name), kKnownFolder);
     std::error_code ignored;
     if (!fs::is_directory(known, ignored)) continue;
-    PLCHOST_TRY(write_text(file_in(known, subject.name + ".pem"), certificate, kPublicFile));
+    PLCHOST_TRY(renew_text(file_in(known, identity + ".pem"), certificate, kPublicFile));
   }
   return {};
 }
 
-Result<void> SecurityFolder::know_all(const std::string& host) const {
-  const std::string known = file_in(path(host), kKnownFolder);
+Result<void> SecurityFolder::know_all(const std::string& known) const {
   PLCHOST_TRY(make_folder(known));
   PLCHOST_TRY_ASSIGN(const auto all, names());
   for (const std::string& name : all) {
     const auto certificate = read_file(file_in(path(name), kCertificateFile));
     PLCHOST_TRY(write_text(file_in(known, name + ".pem"), certificate, kPublicFile));
+  }
+  return sync_directory(known);
+}
+
+Result<void> SecurityFolder::finish_earlier() const {
+  std::error_code error;
+  std::vector<fs::path> unfinished;
+  for (fs::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename();
+    if (name.starts_with('.') && name.ends_with(kFreshFolder)) unfinished.push_back(at->path());
+  }
+  for (const fs::path& each : unfinished) fs::remove_all(each, error);
+  PLCHOST_TRY_ASSIGN(const auto all, names());
+  for (const std::string& name : all) {
+    for (const std::string_view file : kCommonFiles) {
+      PLCHOST_TRY(renew_text(file_in(path(name), file), read_file(authority_file(file)), kPublicFile));
+    }
+    PLCHOST_TRY(tell_hosts(name));
   }
   return {};
 }

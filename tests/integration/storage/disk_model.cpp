@@ -68,6 +68,7 @@ Result<void> DiskModel::add(std::size_t index) {
       step.what = known_[change.inode] = ++last_;
       [[fallthrough]];
     case ChangeKind::rename:
+    case ChangeKind::exchange:
     case ChangeKind::link:
     case ChangeKind::remove:
     case ChangeKind::remove_folder:
@@ -80,8 +81,7 @@ Result<void> DiskModel::add(std::size_t index) {
 
 Result<void> DiskModel::add_name(Step step, const Change& change) {
   const auto at = place(change.path);
-  const bool has_two = change.kind == ChangeKind::rename || change.kind == ChangeKind::link;
-  const auto to = has_two ? place(change.other) : at;
+  const auto to = Step::has_two_names(change.kind) ? place(change.other) : at;
   if (!at || !to || at->second.empty() || to->second.empty())
     return failure(ErrorCode::corrupt, describe(change) + ": its folder was never made");
   step.of = at->first;
@@ -94,6 +94,7 @@ Result<void> DiskModel::add_name(Step step, const Change& change) {
     if (what == names.end()) return failure(ErrorCode::corrupt, describe(change) + ": it was never made");
     step.what = what->second;
   }
+  if (step.kind == ChangeKind::exchange) step.other = now_.folders.at(step.to).at(step.new_name);
   steps_.push_back(step);
   apply(steps_.size() - 1, {}, now_);
   return {};
@@ -130,8 +131,10 @@ void DiskModel::find_syncs() {
       return end;
     };
     const auto own = first([&](Id of) { return of == each.of; });
-    const bool two = each.kind == ChangeKind::rename || each.kind == ChangeKind::link;
-    each.synced = two ? std::max(own, first([&](Id of) { return of == each.to; })) : own;
+    const auto of_new = [&] { return first([&](Id of) { return of == each.to; }); };
+    each.synced = each.kind == ChangeKind::link    ? of_new()
+                  : Step::has_two_names(each.kind) ? std::max(own, of_new())
+                                                   : own;
     each.any_sync = first([](Id) { return true; });
   }
 }
@@ -170,6 +173,9 @@ void DiskModel::apply(std::size_t index, const Part& part, Nodes& nodes) const {
   if (step.kind == ChangeKind::make_folder) (void)nodes.folders[step.what];
   if (step.kind == ChangeKind::create || step.kind == ChangeKind::make_folder) {
     names[step.name] = step.what;
+  } else if (step.kind == ChangeKind::exchange) {
+    names[step.name] = step.other;
+    nodes.folders[step.to][step.new_name] = step.what;
   } else if (step.kind == ChangeKind::link) {
     nodes.folders[step.to][step.new_name] = step.what;
   } else {

@@ -56,6 +56,7 @@ class DiskModel {
 
   /// As processes see it after so many changes.
   [[nodiscard]] FileTree live(std::size_t changes) const;
+  [[nodiscard]] const std::vector<Change>& all_changes() const noexcept { return changes_; }
   [[nodiscard]] std::size_t changes() const noexcept { return changes_.size(); }
   /// The place of the last mark before `cut` that says that `path` is on the disk as it is there: "kept all",
   /// or "kept" with a part of the path. 0: there is none.
@@ -77,14 +78,18 @@ class DiskModel {
   struct Step {
     std::size_t index = 0;  // of the change
     ChangeKind kind = ChangeKind::mark;
-    Id of = kTop;    // the folder whose names change, or the file
-    Id to = kTop;    // the folder of the new name
-    Id what = kTop;  // that has the name
+    Id of = kTop;     // the folder whose names change, or the file
+    Id to = kTop;     // the folder of the new name
+    Id what = kTop;   // that has the name
+    Id other = kTop;  // that has the new name before an exchange
     std::string name;
     std::string new_name;
     std::size_t synced = kNever;  // its own sync has ended with this change
     std::size_t any_sync = kNever;
     bool never_lost = false;  // no state is without it
+    [[nodiscard]] static bool has_two_names(ChangeKind kind) {
+      return kind == ChangeKind::rename || kind == ChangeKind::link || kind == ChangeKind::exchange;
+    }
     [[nodiscard]] bool is_of_bytes() const { return kind == ChangeKind::write || kind == ChangeKind::resize; }
   };
   /// How much of a step is on the disk.

@@ -359,7 +359,7 @@ EXPORTED int renameat(int from_fd, const char* from, int to_fd, const char* to) 
                       [&] { return ::syscall(SYS_renameat2, from_fd, from, to_fd, to, 0U); });
 }
 EXPORTED int renameat2(int from_fd, const char* from, int to_fd, const char* to, unsigned flags) noexcept {
-  return change_names((flags & RENAME_EXCHANGE) != 0 ? ChangeKind::unknown : ChangeKind::rename, from_fd,
+  return change_names((flags & RENAME_EXCHANGE) != 0 ? ChangeKind::exchange : ChangeKind::rename, from_fd,
                       from, to_fd, to,
                       [&] { return ::syscall(SYS_renameat2, from_fd, from, to_fd, to, flags); });
 }

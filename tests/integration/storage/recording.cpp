@@ -43,6 +43,8 @@ std::string describe(const Change& change) {
       return fmt::format("resize {} to {}", change.path, change.number);
     case ChangeKind::rename:
       return fmt::format("rename {} to {}", change.path, change.other);
+    case ChangeKind::exchange:
+      return fmt::format("exchange {} and {}", change.path, change.other);
     case ChangeKind::link:
       return fmt::format("link {} as {}", change.path, change.other);
     case ChangeKind::remove:

@@ -15,6 +15,7 @@ enum class ChangeKind : std::uint32_t {
   write,          ///< `other`: bytes at `number`
   resize,         ///< to `number` bytes
   rename,         ///< `path` to `other`
+  exchange,       ///< `path` and `other`
   link,           ///< `path` is called `other` as well
   remove,         ///< `path`: a file
   remove_folder,  ///< `path`

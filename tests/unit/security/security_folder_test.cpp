@@ -119,6 +119,36 @@ TEST_F(TheSecurityFolder, ARevokedNameTakesAllItsCertificatesWithItAlsoAfterItIs
   }
 }
 
+TEST_F(TheSecurityFolder, ARenewedIdentityKeepsTheOtherFilesOfItsFolder) {
+  namespace fs = std::filesystem;
+  add(Role::operating, "anna");
+  write(file("host", "notes.txt"), "of the plant's administrator");
+  fs::permissions(folder("host"), fs::perms(0750));
+  ASSERT_TRUE(open().renew("host"));
+  EXPECT_THAT(fault("host"), IsEmpty());
+  EXPECT_EQ(contents(file("host", "notes.txt")), "of the plant's administrator");
+  EXPECT_EQ(fs::status(folder("host")).permissions(), fs::perms(0750));
+  EXPECT_TRUE(fs::exists(file("host", "known/anna.pem")));
+  EXPECT_FALSE(fs::exists(folder(".host.new")));
+}
+
+// A revocation that was cut off would else say for ever that it is done.
+TEST_F(TheSecurityFolder, IsBroughtUpToDateByTheNextCommandIfOneWasCutOff) {
+  namespace fs = std::filesystem;
+  add(Role::operating, "anna");
+  add(Role::operating, "otto");
+  const std::string before = contents(file("otto", kRevocationsFile));
+  ASSERT_TRUE(open().revoke("anna"));
+  const std::string after = contents(file("otto", kRevocationsFile));
+  write(file("otto", kRevocationsFile), before);
+  write(file("host", "known/otto.pem"), contents(file("anna", kCertificateFile)));
+  fs::create_directory(folder(".otto.new"));
+  EXPECT_EQ(open().revoke("anna").error().code, ErrorCode::wrong_state);
+  EXPECT_EQ(contents(file("otto", kRevocationsFile)), after);
+  EXPECT_EQ(contents(file("host", "known/otto.pem")), contents(file("otto", kCertificateFile)));
+  EXPECT_FALSE(fs::exists(folder(".otto.new")));
+}
+
 TEST_F(TheSecurityFolder, AFileThatIsNoneMakesNobodyWait) {
   add(Role::operating, "anna");
   for (const std::string_view each : {kCertificateFile, kKeyFile, kRevocationsFile, kPermissionsFile}) {
