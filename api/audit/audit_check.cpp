@@ -26,6 +26,9 @@ void AuditWalk::take(const std::string& where, std::string_view line) {
   if (link->what == "gap") {
     findings_.remarks.push_back(fmt::format("{}: records before could not be written", where));
   }
+  if (link->what == "disk") {
+    findings_.remarks.push_back(fmt::format("{}: a disk error; records before were written again", where));
+  }
   compare(where, *link);
   findings_.head = {.number = link->number, .hash = link->hash};
   ++findings_.records;

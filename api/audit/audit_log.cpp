@@ -59,7 +59,7 @@ AuditLog::AuditLog(Options options, UniqueFd lock) noexcept
 
 AuditLog::~AuditLog() {
   syncer_ = {};
-  if (dirty_) ::fdatasync(file_.get());
+  if (const auto done = sync(); !done) tell_sync(done.error().describe());
 }
 
 Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
@@ -96,6 +96,9 @@ Result<void> AuditLog::open_file(const std::string& path) {
   bytes_ = static_cast<std::size_t>(status.st_size);
   const std::lock_guard lock(guard_);
   file_ = std::move(fd);
+  path_ = path;
+  unsynced_.clear();
+  unsynced_at_ = bytes_;
   dirty_ = true;
   return {};
 }
@@ -108,6 +111,8 @@ Result<void> AuditLog::find_end(const std::vector<AuditFile>& files) {
   if (!end.last_line_is_whole) {
     if (::write(file_.get(), "\n", 1) != 1) return failure(ErrorCode::system, "cannot write " + path, errno);
     ++bytes_;
+    const std::lock_guard lock(guard_);
+    unsynced_ += '\n';
   }
   const bool is_whole = end.head && end.head_is_last;
   for (auto file = files.rbegin() + 1; !end.head && file != files.rend(); ++file) {
@@ -124,13 +129,18 @@ Result<void> AuditLog::find_end(const std::vector<AuditFile>& files) {
 
 // The records of a file are on the disk before another one begins: from then on nobody syncs it.
 Result<void> AuditLog::next_file() {
-  PLCHOST_TRY(check_errno(::fdatasync(file_.get()), "cannot sync the audit log in " + options_.folder));
+  PLCHOST_TRY(sync());
   PLCHOST_TRY_ASSIGN(const auto files, audit_files(options_.folder));
   for (std::size_t i = 0; i + options_.most_files <= files.size(); ++i) ::unlink(files[i].path.c_str());
   return open_file(options_.folder + "/" + audit_file_name(head_.number + 1));
 }
 
 Result<void> AuditLog::write(const AuditRecord& record) {
+  {
+    const std::lock_guard lock(guard_);
+    if (unsynced_.size() >= kMostUnsynced)
+      return failure(ErrorCode::full, "the disk takes no records of the audit log in " + options_.folder);
+  }
   AuditHead moved = head_;
   const std::string line = chain(record, moved);
   const auto written = ::write(file_.get(), line.data(), line.size());
@@ -143,6 +153,7 @@ Result<void> AuditLog::write(const AuditRecord& record) {
   head_ = std::move(moved);
   bytes_ += line.size();
   const std::lock_guard lock(guard_);
+  unsynced_ += line;
   dirty_ = true;
   return {};
 }
@@ -154,10 +165,10 @@ Result<void> AuditLog::append(const AuditRecord& record) {
       PLCHOST_TRY(write(of_the_log("gap", count_text(missed_, "record") + " could not be written")));
       missed_ = 0;
     }
-    if (sync_failed_) {
-      PLCHOST_TRY(
-          write(of_the_log("gap", "the disk reported an error: records before may be missing on it")));
-      sync_failed_ = false;
+    if (written_again_) {
+      PLCHOST_TRY(write(of_the_log(
+          "disk", "the disk reported an error; the records that it may have lost were written again")));
+      written_again_ = false;
     }
     return write(record);
   };
@@ -166,27 +177,64 @@ Result<void> AuditLog::append(const AuditRecord& record) {
   return done;
 }
 
+// The log's own descriptor is told of each error, too. One from before the records are written again is none
+// of the sync after that.
+void AuditLog::take_error_before() {
+  UniqueFd file;
+  {
+    const std::lock_guard lock(guard_);
+    if (!sync_failed_) return;
+    file.reset(::fcntl(file_.get(), F_DUPFD_CLOEXEC, 0));
+  }
+  (void)::fdatasync(file.get());
+}
+
+// Each error of the disk is told once: the sync after a failed one succeeds, though the kernel may have
+// dropped what it could not write. So that is written again, before the next sync.
+Result<void> AuditLog::sync() {
+  const std::lock_guard one(syncing_);
+  const std::string failed = "cannot sync the audit log in " + options_.folder;
+  take_error_before();
+  UniqueFd file;
+  std::string again;
+  std::size_t confirmed = 0;
+  std::size_t begin = 0;
+  {
+    const std::lock_guard lock(guard_);
+    if (!std::exchange(dirty_, false)) return {};
+    confirmed = unsynced_.size();
+    begin = unsynced_at_;
+    if (sync_failed_) again = unsynced_;
+    // Not that of the log, which can only append.
+    file.reset(again.empty() ? ::fcntl(file_.get(), F_DUPFD_CLOEXEC, 0)
+                             : ::open(path_.c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW));
+  }
+  auto done = check_errno(file.get(), failed);
+  for (std::size_t at = 0; done && at < again.size();) {
+    const auto written =
+        ::pwrite(file.get(), again.data() + at, again.size() - at, static_cast<off_t>(begin + at));
+    done = check_errno(static_cast<int>(written), failed);
+    if (done) at += static_cast<std::size_t>(written);
+  }
+  if (done) done = check_errno(::fdatasync(file.get()), failed);
+  const std::lock_guard lock(guard_);
+  dirty_ = dirty_ || !done;
+  sync_failed_ = !done;
+  if (!done) return std::unexpected(done.error());
+  unsynced_.erase(0, confirmed);
+  unsynced_at_ += confirmed;
+  if (!again.empty()) written_again_ = true;
+  return {};
+}
+
 // Beside the thread that appends: a disk may take long.
 void AuditLog::sync_until_stopped(const std::stop_token& stop) {
   std::mutex mutex;
   std::condition_variable_any wake;
   std::unique_lock waiting(mutex);
   while (!wake.wait_for(waiting, stop, kSyncPeriod, [&] { return stop.stop_requested(); })) {
-    UniqueFd file;
-    {
-      const std::lock_guard lock(guard_);
-      if (!std::exchange(dirty_, false)) continue;
-      file.reset(::fcntl(file_.get(), F_DUPFD_CLOEXEC, 0));
-    }
-    if (::fdatasync(file.get()) == 0) {
-      tell_sync("");
-      continue;
-    }
-    const auto error = failure(ErrorCode::system, "cannot sync the audit log in " + options_.folder, errno);
-    sync_failed_ = true;
-    tell_sync(error.error().describe());
-    const std::lock_guard lock(guard_);
-    dirty_ = true;
+    const auto done = sync();
+    tell_sync(done ? "" : done.error().describe());
   }
 }
 
@@ -197,7 +245,7 @@ void AuditLog::tell_sync(const std::string& problem) {
   }
   if (problem.empty()) {
     spdlog::info(
-        "the audit log in {} reaches the disk again; records of the time before may be missing there",
+        "the audit log in {} reaches the disk again; the records of the time before were written again",
         options_.folder);
   } else {
     spdlog::error("records of the audit log may not survive a loss of power: {}", problem);

@@ -20,8 +20,8 @@ namespace plchost {
 /// Each change and its client, in files that are only appended to. Each record carries the hash of the one
 /// before, so that a change of any of them shows (see check_audit). A record survives, when append() has
 /// returned, the end of this process. The disk gets it within kSyncPeriod: from then on it survives a loss of
-/// power. One thread; one log for each
-/// folder.
+/// power. If the disk reports an error, the records since the last good sync are written again. The kernel
+/// may have dropped them, and its next sync succeeds without them. One thread; one log for each folder.
 class AuditLog {
  public:
   struct Options {
@@ -31,6 +31,8 @@ class AuditLog {
     std::size_t most_files = 64;                     ///< then the oldest is removed
   };
   static constexpr auto kSyncPeriod = std::chrono::seconds(1);
+  /// More bytes do not wait for a disk: append() fails.
+  static constexpr std::size_t kMostUnsynced = std::size_t{4} << 20;
 
   /// Goes on where the log ends. busy: another process writes it. system: it cannot be written.
   [[nodiscard]] static Result<std::unique_ptr<AuditLog>> open(Options options);
@@ -54,18 +56,26 @@ class AuditLog {
   Result<void> find_end(const std::vector<AuditFile>& files);
   Result<void> next_file();
   Result<void> write(const AuditRecord& record);
+  /// All that append() has written is on the disk for good when it returns well.
+  Result<void> sync();
+  void take_error_before();
   void sync_until_stopped(const std::stop_token& stop);
   void tell_sync(const std::string& problem);
 
   Options options_;
   UniqueFd lock_;
   AuditHead head_;
-  std::size_t bytes_ = 0;                 // of the file
-  std::uint64_t missed_ = 0;              // records that could not be written
-  std::atomic<bool> sync_failed_{false};  // and the log does not tell it yet
-  mutable std::mutex guard_;              // of what follows
+  std::size_t bytes_ = 0;                   // of the file
+  std::uint64_t missed_ = 0;                // records that could not be written
+  std::atomic<bool> written_again_{false};  // and the log does not tell it yet
+  std::mutex syncing_;                      // held as long as a sync lasts
+  mutable std::mutex guard_;                // of what follows
   UniqueFd file_;
+  std::string path_;      // of it
+  std::string unsynced_;  // its end, as far as no sync has confirmed it
+  std::size_t unsynced_at_ = 0;
   bool dirty_ = false;
+  bool sync_failed_ = false;  // the last one: records that were written before it may be lost
   std::string sync_problem_;
   std::jthread syncer_;
 };
