@@ -204,6 +204,8 @@ Result<void> Manager::set_up() {
 Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
   const HostConfig& own = config_.host;
   const std::string plc_instance = options_.programs + "/plc-instance";
+  const TrialGroup trial_group(groups_, trial_group_name(own.pool, instance.name),
+                               [this, name = instance.name] { return share_of(name).limits; });
   auto host = std::make_unique<ProcessHost>(
       *reactor_, ProcessHost::Settings{.program = plc_instance,
                                        .name = instance.name,
@@ -211,7 +213,8 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
                                        .run_directory = own.run_directory,
                                        .prepare = [this, name = instance.name] { prepare_files(name); },
                                        .groups = &groups_,
-                                       .share = [this, name = instance.name] { return share_of(name); }});
+                                       .share = [this, name = instance.name] { return share_of(name); },
+                                       .trial_group = trial_group});
   ProcessHost& made = *host;
   auto applications = std::make_unique<StoreProcess>(
       *reactor_, state_disk_,
@@ -220,7 +223,8 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
           .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
           .keep = [&own] { return own.application_versions; },
           .helper = "/proc/self/exe",
-          .plc_instance = plc_instance});
+          .plc_instance = plc_instance,
+          .trial_group = trial_group});
   auto wishes =
       std::make_unique<WishStore>(*reactor_, wish_writer_, state_disk_,
                                   WishStore::Settings{.pool = own.pool,
@@ -310,6 +314,7 @@ Result<void> Manager::run() {
                count_text(config_.instances.size(), "instance"), config_.host.pool,
                config_.host.run_directory);
   groups_.remove_empty(control_group_name(config_.host.pool, ""));
+  groups_.remove_empty(trial_group_name(config_.host.pool, ""));
   adopt_removed();
   warn_of_strangers(config_.host.run_directory, supervisor_->configs());
   supervisor_->start();
@@ -410,6 +415,7 @@ void Manager::remove_groups() {
 void Manager::clean_up() {
   restore_latency();
   remove_groups();
+  groups_.remove_empty(trial_group_name(config_.host.pool, ""));  // of a trial that was under way
   for (const auto& [instance, wishes] : wishes_) wishes->end();
   // Also those that were removed from the configuration.
   config_.instances = supervisor_->configs();

@@ -131,7 +131,7 @@ std::string in_senders_words(std::string text, const std::string& path, const st
 }
 
 Result<void> try_application(const StoreOrder& order, const std::string& path) {
-  PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(order.trial, path));
+  PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(order.trial, path, order.trial_group));
   trial.await_end();
   const auto valid = trial.verdict();
   if (valid) return {};

@@ -26,7 +26,8 @@ constexpr std::array kOrderTexts = {OrderText{"folder", &StoreOrder::folder},
                                     OrderText{"by", &StoreOrder::by},
                                     OrderText{"from", &StoreOrder::from},
                                     OrderText{"before", &StoreOrder::before},
-                                    OrderText{"earlier", &StoreOrder::earlier}};
+                                    OrderText{"earlier", &StoreOrder::earlier},
+                                    OrderText{"trial_group", &StoreOrder::trial_group}};
 
 Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint64_t most) {
   const auto found = json.find(key);

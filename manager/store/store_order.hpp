@@ -30,6 +30,7 @@ struct StoreOrder {
   std::string earlier;             ///< path of what is started again if that does not come up; empty: nothing
   std::uint32_t keep = 0;          ///< so many versions stay, and these two and the boot application
   std::vector<std::string> trial;  ///< command line that tries it, its path is added; see trial_arguments()
+  std::string trial_group;         ///< the control group in that command line; empty: none
 };
 
 /// In one argument of a command line, and back. corrupt: it is none.

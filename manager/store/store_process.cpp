@@ -28,8 +28,13 @@ Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string
   store.before = loaded.now;
   store.earlier = loaded.earlier;
   store.keep = settings_.keep();
-  store.trial = trial_arguments(settings_.plc_instance, launch);
-  return start(store, std::move(done));
+  LaunchOptions trial = launch;
+  trial.control_group = settings_.trial_group.begin();
+  store.trial = trial_arguments(settings_.plc_instance, trial);
+  store.trial_group = trial.control_group;
+  auto started = start(store, std::move(done));
+  if (!started) settings_.trial_group.end();
+  return started;
 }
 
 Result<void> StoreProcess::set_boot(const std::string& path, const std::string& configured, Done done) {
@@ -62,10 +67,11 @@ Result<void> StoreProcess::start(StoreOrder order, Done done) {
   constexpr std::size_t kShown = 4000;
   order.parent = ::getpid();
   return helper_.start({settings_.helper, kStoreOption, encode(order)}, kStoreLimit, kShown,
-                       [done = std::move(done)](const HelperEnd& end) { ended(end, done); });
+                       [this, done = std::move(done)](const HelperEnd& end) { ended(end, done); });
 }
 
-void StoreProcess::ended(const HelperEnd& end, const Done& done) {
+void StoreProcess::ended(const HelperEnd& end, const Done& done) const {
+  settings_.trial_group.end();
   const auto& [status, in_time, output] = end;
   if (status.success()) return done(output);
   if (!in_time) {

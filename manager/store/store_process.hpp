@@ -7,6 +7,7 @@
 
 #include "manager/store/application_keeper.hpp"
 #include "manager/store/store_order.hpp"
+#include "manager/system/control_groups.hpp"
 #include "manager/system/disk_thread.hpp"
 #include "manager/system/helper_process.hpp"
 #include "manager/system/reactor.hpp"
@@ -22,6 +23,7 @@ class StoreProcess : public ApplicationKeeper {
     std::function<std::uint32_t()> keep;  ///< so many versions
     std::string helper;                   ///< program: plchostd
     std::string plc_instance;             ///< program that tries an application
+    TrialGroup trial_group = {};
   };
 
   /// `disk` outlives it.
@@ -38,7 +40,7 @@ class StoreProcess : public ApplicationKeeper {
   template <class Answer>
   [[nodiscard]] Answer look(std::function<Answer()> at_folder) const;
   [[nodiscard]] Result<void> start(StoreOrder order, Done done);
-  static void ended(const HelperEnd& end, const Done& done);
+  void ended(const HelperEnd& end, const Done& done) const;
 
   DiskThread& disk_;
   Settings settings_;

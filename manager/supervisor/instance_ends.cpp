@@ -92,6 +92,7 @@ Order ManagedInstance::order() const noexcept {
 EndCause ManagedInstance::cause_of_refusal() const noexcept {
   if (name_taken_) return EndCause::name_taken;
   if (declaration_taken_) return EndCause::declaration_taken;
+  if (limit_met_) return EndCause::limit_met;
   return transient_ ? EndCause::start_transient : EndCause::start_refused;
 }
 

@@ -59,6 +59,8 @@ class InstanceHost {
   virtual void read_output() = 0;
   /// The last line that the process has said, of a longer one the last 500 bytes; empty: it has said nothing.
   [[nodiscard]] virtual std::string last_line() const = 0;
+  /// The kernel has refused the process a thread or a process for its pids_max.
+  [[nodiscard]] virtual bool has_met_pids_max() const = 0;
 };
 
 /// The events of an instance.

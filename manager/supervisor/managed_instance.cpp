@@ -73,6 +73,8 @@ void ManagedInstance::on_report(const SetupReport& report) {
     setup_failure_ = fmt::format("{}: {}", to_string(report.step), report.text);
     name_taken_ = report.code == ErrorCode::already_exists;
     transient_ = report.transient;
+    limit_met_ = report.transient && host_.has_met_pids_max();
+    if (limit_met_) setup_failure_ += "; it needs more threads and processes than its pids_max";
     declaration_taken_ = report.code == ErrorCode::busy;
     return;  // the process ends by itself now, or the timer sees to it
   }
@@ -238,7 +240,7 @@ void ManagedInstance::spawn(Next next) {
   setup_failure_.clear();
   said_scheduler_.clear();
   awaited_.reset();
-  name_taken_ = transient_ = declaration_taken_ = false;
+  name_taken_ = transient_ = declaration_taken_ = limit_met_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {
     transient_ = is_transient(pid.error());

@@ -360,6 +360,7 @@ class ManagedInstance : public InstanceEvents {
   // Another process has the thing that the application declares, or that its settings force. It may let go of
   // it, but the application before may do without.
   bool declaration_taken_ = false;
+  bool limit_met_ = false;   // its pids_max has kept this process from being set up
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
   HeartbeatWatch heartbeat_;

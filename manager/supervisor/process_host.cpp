@@ -96,6 +96,7 @@ Result<int> ProcessHost::adopt_peer() {
     return failure(ErrorCode::refused,
                    fmt::format("process {} is not of user {}, as its socket is", pid, user));
   PLCHOST_TRY(follow(process));
+  if (settings_.groups != nullptr) settings_.groups->take_over(group_name());
   output_.adopt();
   output_.say(LogLevel::info, pid, fmt::format("a new manager has adopted process {}", pid));
   return pid;
@@ -174,7 +175,7 @@ void ProcessHost::read_replies() {
 bool ProcessHost::end_group() {
   // The process that ended may have been put into the group of another one that has the name.
   if (settings_.groups == nullptr || name_is_held()) return false;
-  const bool out_of_memory = settings_.groups->was_out_of_memory(group_name());
+  const bool out_of_memory = settings_.groups->counts(group_name()).oom_kills != 0;
   settings_.groups->end(group_name());
   return out_of_memory;
 }
@@ -210,14 +211,23 @@ void ProcessHost::forget_process() {
   process_.reset();
 }
 
+bool ProcessHost::has_met_pids_max() const {
+  return settings_.groups != nullptr && settings_.groups->counts(group_name()).pids_refused != 0;
+}
+
 Result<void> ProcessHost::check_application(const LaunchOptions& options) {
-  PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(settings_.program, options));
-  auto watch = reactor_.watch(trial.fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
+  LaunchOptions launch = options;
+  launch.control_group = settings_.trial_group.begin();
+  auto trial = ApplicationTrial::start(settings_.program, launch);
+  auto watch = and_then(trial, [&](const auto& started) {
+    return reactor_.watch(started.fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
+  });
   if (!watch) {
-    trial.give_up();
+    if (trial) trial->give_up();
+    settings_.trial_group.end();
     return std::unexpected(watch.error());
   }
-  check_ = std::move(trial);
+  check_ = std::move(*trial);
   check_watch_ = std::move(*watch);
   check_timer_.set(MonotonicClock::now() + kTrialLimit);
   return {};
@@ -232,6 +242,7 @@ void ProcessHost::check_timed_out() {
 
 void ProcessHost::check_ended() {
   const auto verdict = check_->verdict();
+  settings_.trial_group.end();
   check_timer_.cancel();
   check_watch_.reset();
   check_.reset();

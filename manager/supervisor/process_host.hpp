@@ -36,6 +36,7 @@ class ProcessHost : public InstanceHost {
     ControlGroups* groups = nullptr;
     /// Of the next process; may be empty.
     std::function<Share()> share = {};
+    TrialGroup trial_group = {};
   };
 
   ProcessHost(Reactor& reactor, Settings settings);
@@ -59,6 +60,7 @@ class ProcessHost : public InstanceHost {
   void end_outputs() override;
   void read_output() override;
   [[nodiscard]] std::string last_line() const override { return output_.last_line(); }
+  [[nodiscard]] bool has_met_pids_max() const override;
 
  private:
   /// The folder of its control group; empty: it has none.

@@ -37,6 +37,7 @@ constexpr auto kDecisionRows = [] {
       {start_refused,       Counts::end,     false, true,  fail,           fail,           back_off,       go_offline, fail},
       {start_transient,     Counts::end,     false, false, fail,           back_off,       back_off,       go_offline, fail},
       {declaration_taken,   Counts::end,     false, true,  fail,           back_off,       back_off,       go_offline, fail},
+      {limit_met,           Counts::end,     false, true,  fail,           back_off,       back_off,       go_offline, fail},
       {name_taken,          Counts::end,     false, false, back_off,       back_off,       back_off,       go_offline, fail},
       {exception,           Counts::nothing, false, false, leave,          leave,          leave,          leave,      leave},
       {silent,              Counts::nothing, false, false, leave,          leave,          leave,          leave,      leave},

@@ -40,6 +40,7 @@ enum class EndCause : std::uint8_t {
   start_refused,      ///< wrong files or settings, or not ready in time
   start_transient,    ///< the host was short of something, or a lock was held
   declaration_taken,  ///< another process has an output or a node address that the start needs
+  limit_met,          ///< it needs more threads and processes than its pids_max
   name_taken,         ///< a process of that name is there already
   // The process is there, but its application does not run, or its state is not known.
   exception,            ///< a fault has stopped the application

@@ -43,14 +43,15 @@ std::vector<std::string> trial_arguments(const std::string& plc_instance, Launch
   return arguments;
 }
 
-Result<ApplicationTrial> ApplicationTrial::start(std::vector<std::string> arguments,
-                                                 const std::string& path) {
+Result<ApplicationTrial> ApplicationTrial::start(std::vector<std::string> arguments, const std::string& path,
+                                                 const std::string& group) {
   PLCHOST_TRY_ASSIGN(auto pipe, make_output_pipe());
   (void)::fcntl(pipe.write_end.get(), F_SETPIPE_SZ, kTrialOutputRoom);
+  const GroupCounts before = counts_of_group(group);
   arguments.insert(arguments.end(), {path, "--parent", fmt::format("{}", ::getpid())});
   PLCHOST_TRY_ASSIGN(auto process,
                      spawn_process({.arguments = std::move(arguments), .output_fd = pipe.write_end.get()}));
-  return ApplicationTrial(path, std::move(process), std::move(pipe.read_end));
+  return ApplicationTrial(path, {group, before}, std::move(process), std::move(pipe.read_end));
 }
 
 Duration ApplicationTrial::time_left() const {
@@ -75,6 +76,16 @@ void ApplicationTrial::give_up() {
   (void)signal_process(process_, SIGKILL);
 }
 
+std::string ApplicationTrial::met_limits() const {
+  const auto& [folder, before] = group_;
+  const GroupCounts now = counts_of_group(folder);
+  std::string text;
+  if (now.oom_kills > before.oom_kills) text += "; it needs more memory than memory_max_mib of its instance";
+  if (now.pids_refused > before.pids_refused)
+    text += "; it needs more threads and processes than pids_max of its instance";
+  return text;
+}
+
 Result<void> ApplicationTrial::verdict() {
   end_session(process_);
   const ExitStatus status = reap_process(process_);
@@ -94,9 +105,8 @@ Result<void> ApplicationTrial::verdict() {
   while (output.ends_with('\n')) output.pop_back();
   output = one_line(output);
   if (const std::string name = path_ + ": "; output.starts_with(name)) output.erase(0, name.size());
-  return failure(
-      ErrorCode::invalid_argument,
-      output.empty() ? fmt::format("the process that tried it has ended: {}", status.describe()) : output);
+  if (output.empty()) output = fmt::format("the process that tried it has ended: {}", status.describe());
+  return failure(ErrorCode::invalid_argument, output + met_limits());
 }
 
 }  // namespace plchost

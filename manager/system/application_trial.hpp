@@ -6,6 +6,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "manager/system/child_process.hpp"
+#include "manager/system/control_groups.hpp"
 #include "shm/base/time.hpp"
 #include "shm/process/work_limit.hpp"
 
@@ -24,12 +25,13 @@ inline constexpr Duration kTrialLimit = kSetUpLimit + std::chrono::seconds(2);
 /// with all that the process of its instance is started with.
 class ApplicationTrial {
  public:
-  /// `arguments`: see trial_arguments(). `path`: of the application.
+  /// `arguments`: see trial_arguments(). `path`: of the application. `group`: the control group that they
+  /// name; empty: none.
   [[nodiscard]] static Result<ApplicationTrial> start(std::vector<std::string> arguments,
-                                                      const std::string& path);
+                                                      const std::string& path, const std::string& group);
   [[nodiscard]] static Result<ApplicationTrial> start(const std::string& plc_instance,
                                                       const LaunchOptions& options) {
-    return start(trial_arguments(plc_instance, options), options.application);
+    return start(trial_arguments(plc_instance, options), options.application, options.control_group);
   }
 
   /// Readable when it has ended.
@@ -45,10 +47,20 @@ class ApplicationTrial {
   [[nodiscard]] Result<void> verdict();
 
  private:
-  ApplicationTrial(std::string path, ChildProcess process, UniqueFd output) noexcept
-      : path_(std::move(path)), process_(std::move(process)), output_(std::move(output)) {}
+  struct Group {
+    std::string folder;  // empty: it has none
+    GroupCounts before;
+  };
+  ApplicationTrial(std::string path, Group group, ChildProcess process, UniqueFd output) noexcept
+      : path_(std::move(path)),
+        group_(std::move(group)),
+        process_(std::move(process)),
+        output_(std::move(output)) {}
+  /// The limits of its group that the trial has met, as the end of a sentence.
+  [[nodiscard]] std::string met_limits() const;
 
   std::string path_;
+  Group group_;
   ChildProcess process_;
   UniqueFd output_;
   WorkLimit limit_{kTrialLimit, MonotonicClock::now()};

@@ -37,6 +37,15 @@ bool has_word(const std::string& text, std::string_view wanted) {
   return false;
 }
 
+bool lists(std::string_view list, std::string_view controller) {
+  for (std::size_t at = 0; !controller.empty() && at <= list.size();) {
+    const std::size_t end = std::min(list.find(',', at), list.size());
+    if (list.substr(at, end - at) == controller) return true;
+    at = end + 1;
+  }
+  return false;
+}
+
 // As the kernel writes blanks and the like in paths of mountinfo: "\040".
 std::string unescaped(std::string_view text) {
   constexpr std::size_t kLength = 4;
@@ -75,21 +84,36 @@ Result<void> set_limit(const std::string& group, std::string_view file, std::str
   return write_kernel_file(path, value);
 }
 
+// Lines of the form "oom_kill 2".
+std::uint64_t count_in(std::string_view text, std::string_view wanted) {
+  std::istringstream words{std::string(text)};
+  std::string what;
+  for (std::uint64_t times = 0; words >> what >> times;) {
+    if (what == wanted) return times;
+  }
+  return 0;
+}
+
 std::string limit_text(std::uint64_t limit) {
   return limit == 0 ? "max" : fmt::format("{}", limit);
 }
 
 }  // namespace
 
-std::string own_control_group(std::string_view text) {
-  constexpr std::string_view kVersion2 = "0::";
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = text.substr(at, end - at);
-    if (line.starts_with(kVersion2)) return std::string(line.substr(kVersion2.size()));
-    at = end + 1;
+// "4:cpu,cpuacct:/path", and "0::/path" of version 2.
+std::optional<GroupPlace> group_place(std::string_view text, std::string_view controller) {
+  std::optional<GroupPlace> place;
+  std::istringstream lines{std::string(text)};
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t first = line.find(':');
+    const std::size_t second = first == std::string::npos ? first : line.find(':', first + 1);
+    if (second == std::string::npos) continue;
+    const std::string list = line.substr(first + 1, second - first - 1);
+    const bool version2 = list.empty() && line.starts_with("0:");
+    if (version2 ? !place : lists(list, controller))
+      place = GroupPlace{.controllers = list, .path = line.substr(second + 1)};
   }
-  return {};
+  return place;
 }
 
 // "38 31 0:35 / /sys/fs/cgroup/unified rw - cgroup2 cgroup2 rw": the fourth is the folder that is mounted.
@@ -113,17 +137,21 @@ std::string groups_beside(std::string_view mount, std::string_view own) {
   return fmt::format("{}{}/{}", mount, own.substr(0, own.rfind('/')), kUnitOfGroups);
 }
 
-bool tells_oom_kill(std::string_view text) {
-  std::istringstream words{std::string(text)};
-  std::string what;
-  for (std::uint64_t times = 0; words >> what >> times;) {
-    if (what == "oom_kill") return times != 0;
-  }
-  return false;
+GroupCounts group_counts(std::string_view memory, std::string_view pids) {
+  return {.oom_kills = count_in(memory, "oom_kill"), .pids_refused = count_in(pids, "max")};
+}
+
+GroupCounts counts_of_group(const std::string& folder) {
+  if (folder.empty()) return {};
+  return group_counts(text_of_file(folder + "/memory.events"), text_of_file(folder + "/pids.events"));
 }
 
 std::string control_group_name(std::string_view pool, std::string_view instance) {
   return fmt::format("{}.instance.{}", pool, instance);
+}
+
+std::string trial_group_name(std::string_view pool, std::string_view instance) {
+  return fmt::format("{}.trial.{}", pool, instance);
 }
 
 ControlGroups ControlGroups::find(const std::string& folder) {
@@ -131,7 +159,8 @@ ControlGroups ControlGroups::find(const std::string& folder) {
   groups.folder_ = folder;
   if (folder.empty()) {
     const std::string mount = control_group_mount(text_of_file("/proc/self/mountinfo"));
-    groups.folder_ = groups_beside(mount, own_control_group(text_of_file("/proc/self/cgroup")));
+    const auto own = group_place(text_of_file("/proc/self/cgroup"), "");
+    groups.folder_ = groups_beside(mount, own ? own->path : "");
     if (mount.empty()) groups.problem_ = "control groups of version 2 are not mounted";
   }
   if (groups.problem_.empty()) groups.look_at_folder(!folder.empty());
@@ -174,7 +203,7 @@ Result<ControlGroups::Made> ControlGroups::make(const std::string& name, const G
   std::erase(ended_, name);
   // Each time: systemd takes them back when somebody starts the unit of the groups anew.
   enable_controllers();
-  (void)::rmdir(made.folder.c_str());  // an empty one: its counters are those of an earlier process
+  (void)remove_group(made.folder);  // one without a process: its limits and counts are those of earlier ones
   constexpr mode_t kMode = 0755;
   if (::mkdir(made.folder.c_str(), kMode) != 0 && errno != EEXIST)
     return failure(ErrorCode::system, "cannot make the control group " + made.folder, errno);
@@ -185,6 +214,7 @@ Result<ControlGroups::Made> ControlGroups::make(const std::string& name, const G
   set("memory.max", limit_text(limits.memory_bytes));
   set("memory.oom.group", "1");
   set("pids.max", limit_text(limits.pids));
+  take_over(name);
   return made;
 }
 
@@ -192,13 +222,24 @@ void ControlGroups::kill(const std::string& name) const noexcept {
   if (problem_.empty()) (void)write_kernel_file(path(name) + "/cgroup.kill", "1");
 }
 
-bool ControlGroups::was_out_of_memory(const std::string& name) const {
-  return problem_.empty() && tells_oom_kill(text_of_file(path(name) + "/memory.events"));
+void ControlGroups::take_over(const std::string& name) {
+  if (problem_.empty()) before_[name] = counts_of_group(path(name));
+}
+
+GroupCounts ControlGroups::counts(const std::string& name) const {
+  if (!problem_.empty()) return {};
+  const GroupCounts now = counts_of_group(path(name));
+  const auto found = before_.find(name);
+  const GroupCounts before = found == before_.end() ? GroupCounts{} : found->second;
+  const auto more = [](std::uint64_t count, std::uint64_t than) { return count > than ? count - than : 0; };
+  return {.oom_kills = more(now.oom_kills, before.oom_kills),
+          .pids_refused = more(now.pids_refused, before.pids_refused)};
 }
 
 void ControlGroups::end(const std::string& name) {
   if (!problem_.empty() || ::access(path(name).c_str(), F_OK) != 0) return;
   kill(name);
+  before_.erase(name);
   if (std::ranges::find(ended_, name) == ended_.end()) ended_.push_back(name);
   (void)remove_ended();
 }
@@ -215,6 +256,20 @@ void ControlGroups::remove_empty(std::string_view prefix) const {
        at.increment(error)) {
     if (at->path().filename().native().starts_with(prefix)) (void)::rmdir(at->path().c_str());
   }
+}
+
+std::string TrialGroup::begin() const {
+  if (groups_ == nullptr || !groups_->problem().empty()) return {};
+  // The process that tries it has one thread more than an instance with the same tasks.
+  GroupLimits limits = limits_();
+  if (limits.pids != 0) ++limits.pids;
+  groups_->kill(name_);  // a trial of an earlier manager
+  const auto made = groups_->make(name_, limits);
+  return made ? made->folder : std::string();
+}
+
+void TrialGroup::end() const {
+  if (groups_ != nullptr) groups_->end(name_);
 }
 
 }  // namespace plchost

@@ -17,12 +17,19 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST(ControlGroupTexts, TellTheOwnGroupOfVersion2) {
-  EXPECT_EQ(own_control_group("9:name=systemd:/a\n4:memory:/b\n0::/system.slice/plchostd.service\n"),
-            "/system.slice/plchostd.service");
-  EXPECT_EQ(own_control_group("0::/"), "/");
-  EXPECT_EQ(own_control_group("4:memory:/b\n10::/x\n"), "");
-  EXPECT_EQ(own_control_group(""), "");
+TEST(ControlGroupTexts, TellTheGroupOfAProcess) {
+  const auto path = [](std::string_view text, std::string_view controller) {
+    const auto place = group_place(text, controller);
+    return place ? place->controllers + place->path : "nowhere";
+  };
+  const std::string text = "9:name=systemd:/a\n4:cpu,cpuacct:/b\n0::/system.slice/plchostd.service\n";
+  EXPECT_EQ(path(text, ""), "/system.slice/plchostd.service");
+  EXPECT_EQ(path(text, "pids"), "/system.slice/plchostd.service");
+  EXPECT_EQ(path(text, "cpuacct"), "cpu,cpuacct/b");
+  EXPECT_EQ(path("0::/x\n4:cpu:/b\n", "cpu"), "cpu/b") << "in any order";
+  EXPECT_EQ(path("0::/", ""), "/");
+  EXPECT_EQ(path("4:memory:/b\n10::/x\n", ""), "nowhere");
+  EXPECT_EQ(path("garbage\n", "cpu"), "nowhere");
 }
 
 TEST(ControlGroupTexts, TellWhereVersion2IsMounted) {
@@ -61,11 +68,17 @@ TEST(ControlGroupsOfNobody, SayWhyThereAreNone) {
   EXPECT_FALSE(std::filesystem::exists(plain / "line1"));
 }
 
-TEST(ControlGroupTexts, TellWhetherMemoryWasShort) {
-  EXPECT_FALSE(tells_oom_kill("low 0\nhigh 0\nmax 7\noom 3\noom_kill 0\noom_group_kill 0\n"));
-  EXPECT_TRUE(tells_oom_kill("low 0\nmax 7\noom 3\noom_kill 2\noom_group_kill 1\n"));
-  EXPECT_FALSE(tells_oom_kill(""));
+TEST(ControlGroupTexts, TellTheLimitsThatWereMet) {
+  const auto none = group_counts("low 0\nhigh 0\nmax 7\noom 3\noom_kill 0\noom_group_kill 0\n", "max 0\n");
+  EXPECT_EQ(none.oom_kills, 0U);
+  EXPECT_EQ(none.pids_refused, 0U);
+  const auto some = group_counts("low 0\nmax 7\noom 3\noom_kill 2\noom_group_kill 1\n", "max 5\n");
+  EXPECT_EQ(some.oom_kills, 2U);
+  EXPECT_EQ(some.pids_refused, 5U);
+  EXPECT_EQ(group_counts("", "").oom_kills, 0U) << "no controller";
 }
+
+constexpr const char* kNoLimits = "needs the controllers of memory and pids in version 2";
 
 class ControlGroupsTest : public testing::Test {
  protected:
@@ -112,6 +125,45 @@ TEST_F(ControlGroupsTest, AreRemovedWithTheGroupsThatAProcessHasMadeInThem) {
   EXPECT_FALSE(folder_.has("line1"));
 }
 
+// Else the kernel's counts of an earlier process would be told of the next one.
+TEST_F(ControlGroupsTest, AreMadeAnewAlsoWithTheGroupsOfAnEarlierProcess) {
+  ASSERT_TRUE(sut_.make("line1", {}));
+  std::filesystem::create_directories(folder_.path() + "/line1/a/b");
+  ASSERT_TRUE(sut_.make("line1", {}));
+  EXPECT_FALSE(folder_.has("line1/a"));
+}
+
+TEST_F(ControlGroupsTest, TellOfTheLastProcessOnlyWhichLimitsItHasMet) {
+  if (lacks("memory") || lacks("pids")) GTEST_SKIP() << kNoLimits;
+  const GroupLimits limits{.memory_bytes = 8U << 20, .pids = 2};
+  ASSERT_TRUE(sut_.make("line1", limits));
+  const std::string group = folder_.path() + "/line1";
+  const auto forks = run_in(group, "sleep 1000 & sleep 1000 & sleep 1000 & wait");
+  ASSERT_TRUE(forks);
+  for (int i = 0; i < 1000 && sut_.counts("line1").pids_refused == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_NE(sut_.counts("line1").pids_refused, 0U);
+  kill_and_reap(*forks);
+  const auto fills = run_in(group, "exec tail /dev/zero");
+  ASSERT_TRUE(fills);
+  for (int i = 0; i < 1000 && sut_.counts("line1").oom_kills == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_NE(sut_.counts("line1").oom_kills, 0U);
+  kill_and_reap(*fills);
+  // A process keeps the group from being made anew.
+  const auto left = run_in(group, "exec sleep 1000");
+  ASSERT_TRUE(left);
+  ASSERT_TRUE(folder_.comes_to("line1", 1));
+  ControlGroups next = ControlGroups::find(folder_.path());
+  EXPECT_NE(next.counts("line1").oom_kills, 0U) << "the process that it had may have ended by that";
+  ASSERT_TRUE(sut_.make("line1", limits));
+  EXPECT_EQ(sut_.counts("line1").oom_kills, 0U);
+  EXPECT_EQ(sut_.counts("line1").pids_refused, 0U);
+  next.take_over("line1");
+  EXPECT_EQ(next.counts("line1").oom_kills, 0U);
+  kill_and_reap(*left);
+}
+
 TEST_F(ControlGroupsTest, AreUsedAgainByTheNextProcess) {
   ASSERT_TRUE(sut_.make("line1", {}));
   const auto process = run_in(folder_.path() + "/line1", "exec sleep 1000");
@@ -129,8 +181,7 @@ TEST_F(ControlGroupsTest, AreUsedAgainByTheNextProcess) {
 }
 
 TEST_F(ControlGroupsTest, HaveTheLimitsOfTheLastStartOnly) {
-  if (lacks("memory") || lacks("pids"))
-    GTEST_SKIP() << "needs the controllers of memory and pids in version 2";
+  if (lacks("memory") || lacks("pids")) GTEST_SKIP() << kNoLimits;
   ASSERT_TRUE(sut_.make("line1", {.memory_bytes = 64U << 20, .pids = 20}));
   EXPECT_EQ(folder_.text("line1", "memory.max"), "67108864");
   EXPECT_EQ(folder_.text("line1", "memory.oom.group"), "1");

@@ -44,6 +44,7 @@ class FakeHost : public InstanceHost {
   void end_outputs() override { ++ended_outputs; }
   void read_output() override {}
   [[nodiscard]] std::string last_line() const override { return said; }
+  [[nodiscard]] bool has_met_pids_max() const override { return met_pids_max; }
 
   std::vector<LaunchOptions> spawned;
   std::vector<ControlRequest> requests;
@@ -65,6 +66,7 @@ class FakeHost : public InstanceHost {
   int ended_outputs = 0;
   int forgotten = 0;
   std::string said;
+  bool met_pids_max = false;
   int next_pid = 100;
 };
 

@@ -80,6 +80,21 @@ TEST_F(TakenBack, AlsoAfterABackOff) {
   }
 }
 
+// Where the limits of the instance do not let the process up, no later start will do better.
+TEST_F(TakenBack, WhereItNeedsMoreThreadsThanTheInstanceMayHave) {
+  bring_up();
+  begin_load();
+  host_.met_pids_max = true;
+  sut().on_report(
+      {.step = SetupStep::make_tasks, .code = ErrorCode::system, .text = "EAGAIN", .transient = true});
+  sut().on_exit(exited_with(kExitSetupFailed));
+  ASSERT_EQ(host_.spawned.size(), 3U);
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+  report_ready();
+  EXPECT_THAT(take_reply().text, HasSubstr("EAGAIN; it needs more threads and processes than its pids_max"));
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
 // The settings file that the configuration names now counts, and the client hears of the failure all the
 // same.
 TEST_F(TakenBack, IsToldAlsoWhereTheConfigurationChangesMeanwhile) {

@@ -34,25 +34,38 @@ class ProcessHostTest : public ::testing::Test, public InstanceEvents {
   void on_report(const SetupReport& /*report*/) override {}
   void on_reply(const ControlReply& /*reply*/) override {}
   void on_timer() override {}
-  void on_application_checked(const Result<void>& /*result*/) override {}
+  void on_application_checked(const Result<void>& result) override {
+    refusal_ = result ? "" : result.error().message;
+    reactor_->stop();
+  }
   void on_exit(const ExitStatus& status) override {
     end_ = status;
     said_ = sut_.last_line();
     reactor_->stop();
   }
-  void run(const std::string& script) {
+  void write_program(const std::string& script) const {
     const std::string program = folder_ / "plc-instance";
     std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
     std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+  }
+  void run(const std::string& script) {
+    write_program(script);
     const auto pid = sut_.spawn({});
     ASSERT_TRUE(pid) << pid.error().describe();
     ASSERT_TRUE(reactor_->run());
   }
 
   /// The script that plays the instance, in the group that it is told.
-  void run_in_group(const std::string& script) {
-    run("while [ \"$1\" != --control-group ]; do shift; done\necho 0 >\"$2/cgroup.procs\"\n" + script);
+  void run_in_group(const std::string& script) { run(kEnterGroup + script); }
+  /// The same of a trial of an application.
+  void run_trial(const std::string& script) {
+    write_program(kEnterGroup + script);
+    ASSERT_TRUE(sut_.check_application({}));
+    ASSERT_TRUE(reactor_->run());
   }
+
+  const std::string kEnterGroup =
+      "while [ \"$1\" != --control-group ]; do shift; done\necho 0 >\"$2/cgroup.procs\"\n";
 
   GroupFolder folder_of_groups_;
   ControlGroups groups_ = ControlGroups::find(folder_of_groups_.path());
@@ -65,9 +78,13 @@ class ProcessHostTest : public ::testing::Test, public InstanceEvents {
                     .pool = pool_,
                     .run_directory = folder_,
                     .groups = &groups_,
-                    .share = [] { return ProcessHost::Share{.limits = {}, .oom_score = 300}; }}};
+                    .share = [] { return ProcessHost::Share{.limits = {}, .oom_score = 300}; },
+                    .trial_group = TrialGroup(groups_, trial_group_name(pool_, "line1"),
+                                              [this] { return limits_of_trial_; })}};
+  GroupLimits limits_of_trial_;
   ExitStatus end_;
   std::string said_;
+  std::string refusal_;  // of an application; empty: it is valid
 };
 
 TEST_F(ProcessHostTest, KnowsTheLastLineOfAProcessWhenItHasEnded) {
@@ -105,6 +122,34 @@ TEST_F(ProcessHostWithGroups, EndsWhatAProcessHasLeftInItsGroup) {
                " ]; do sleep 0.01; done");
   EXPECT_TRUE(end_.success()) << end_.describe();
   EXPECT_TRUE(folder_of_groups_.comes_to(group, 0));
+}
+
+TEST_F(ProcessHostWithGroups, TriesApplicationsInAGroupOfTheirOwn) {
+  const std::string group = trial_group_name(pool_, "line1");
+  const std::string left = folder_ / "left";
+  run_trial("cat /proc/self/cgroup\nsetsid sh -c 'echo >" + left +
+            "; exec sleep 1000' >/dev/null 2>&1 &\nwhile [ ! -e " + left + " ]; do sleep 0.01; done\nexit 3");
+  EXPECT_TRUE(refusal_.contains("/" + group)) << refusal_;
+  for (int i = 0; i < 1000 && !groups_.remove_ended(); ++i) ::usleep(10'000);
+  EXPECT_FALSE(folder_of_groups_.has(group)) << "nor the process that it has left";
+}
+
+TEST_F(ProcessHostWithGroups, TriesApplicationsWithTheLimitsOfTheInstance) {
+  const std::string group = folder_of_groups_.path() + "/" + trial_group_name(pool_, "line1");
+  limits_of_trial_ = {.memory_bytes = 64U << 20, .pids = 16};
+  run_trial("cat \"$2/memory.max\" \"$2/pids.max\"\nexit 3");
+  if (refusal_.contains("No such file"))
+    GTEST_SKIP() << "needs the controllers of memory and pids in version 2";
+  EXPECT_TRUE(refusal_.contains("67108864; 17")) << refusal_;
+  limits_of_trial_ = {.memory_bytes = 64U << 20, .pids = 2};
+  run_trial("sleep 1000 & sleep 1000 & sleep 1000 & sleep 1000 & wait\nexit 3");
+  EXPECT_TRUE(refusal_.contains("; it needs more threads and processes than pids_max of its instance"))
+      << refusal_;
+  limits_of_trial_ = {.memory_bytes = 8U << 20, .pids = 0};
+  run_trial("exec tail /dev/zero");
+  EXPECT_EQ(refusal_,
+            "the process that tried it has ended: killed by SIGKILL; it needs more memory than "
+            "memory_max_mib of its instance");
 }
 
 void ProcessHostWithGroups::expect_holder_runs_on(const std::string& claim) {

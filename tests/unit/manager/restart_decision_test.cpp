@@ -89,6 +89,7 @@ constexpr std::array<DecisionCase, kEndCauses> kDecisionCases = {{
     {EndCause::start_refused, "fail", "fail", kFailure, "offline", "fail", "fail", "start earlier"},
     {EndCause::start_transient, "fail", kFailure, kFailure, "offline", "fail", kFailure, kFailure},
     {EndCause::declaration_taken, "fail", kFailure, kFailure, "offline", "fail", kFailure, "start earlier"},
+    {EndCause::limit_met, "fail", kFailure, kFailure, "offline", "fail", kFailure, "start earlier"},
     {EndCause::name_taken, kFailure, kFailure, kFailure, "offline", "fail", kFailure, kFailure},
     {EndCause::exception, "leave", "leave", "leave", "leave", "leave", "leave", "leave"},
     {EndCause::silent, "leave", "leave", "leave", "leave", "leave", "leave", "leave"},

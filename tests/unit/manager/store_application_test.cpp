@@ -301,6 +301,7 @@ TEST(StoreOrder, SurvivesTheRoundTrip) {
   order.keep = 5;
   order.name = "l\xc3\xa4mp.so";
   order.trial = {"/usr/bin/plc-instance", "--name", "line \"1\""};
+  order.trial_group = "/sys/fs/cgroup/p.trial.line1";
   const auto decoded = decode_store_order(encode(order));
   ASSERT_TRUE(decoded);
   EXPECT_EQ(decoded->parent, 4711);
@@ -310,6 +311,7 @@ TEST(StoreOrder, SurvivesTheRoundTrip) {
   EXPECT_EQ(decoded->keep, 5U);
   EXPECT_EQ(decoded->name, order.name);
   EXPECT_EQ(decoded->trial, order.trial);
+  EXPECT_EQ(decoded->trial_group, order.trial_group);
   for (const char* bad : {"", "{}", "[]", "{\"size\":-1}"}) {
     EXPECT_EQ(decode_store_order(bad).error().code, ErrorCode::corrupt);
   }
