@@ -255,6 +255,15 @@ CheckedHost Manager::checked_host() const {
   CheckedHost host = this_host(config_);
   host.groups = {.folder = groups_.folder(), .problem = groups_.problem(), .missing = {}};
   for (const auto& [controller, why] : groups_.missing()) host.groups.missing.emplace_back(controller, why);
+  for (CheckedHost::Instance& instance : host.instances) {
+    instance.group = control_group_name(config_.host.pool, instance.name);
+    for (std::size_t i = 0; i < supervisor_->size(); ++i) {
+      const InstanceStatus& status = supervisor_->instance(i).status();
+      // One that is being set up may not have gone into its group yet.
+      if (status.name.view() == instance.name && status.state != InstanceState::starting)
+        instance.pid = status.pid;
+    }
+  }
   return host;
 }
 

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "manager/host_check/checks.hpp"
+#include "manager/system/control_groups.hpp"
 #include "shm/base/cpu_list.hpp"
 
 namespace plchost::host_check {
@@ -94,44 +95,50 @@ std::string boot_value(std::string_view command_line, std::string_view key) {
 
 namespace {
 
-bool has_controller(std::string_view list, std::string_view controller) {
-  for (std::size_t at = 0; at <= list.size();) {
-    const std::size_t end = std::min(list.find(',', at), list.size());
-    if (list.substr(at, end - at) == controller) return true;
-    at = end + 1;
+// `folder` and those above it, up to `top`.
+std::vector<std::string> folders_upwards(const HostFiles& files, std::string folder, std::string_view top) {
+  std::vector<std::string> folders;
+  constexpr std::size_t kDeepest = 64;
+  while (folder.size() >= top.size() && folders.size() < kDeepest) {
+    while (folder.size() > top.size() && folder.ends_with('/')) folder.pop_back();
+    // A process in a name space of its own may be told a path that is not there.
+    if (files.exists(folder)) folders.push_back(folder);
+    folder.resize(folder.rfind('/') == std::string::npos ? 0 : folder.rfind('/'));
   }
-  return false;
+  return folders;
+}
+
+std::string mount_of_version2(const HostFiles& files) {
+  const std::string mount = control_group_mount(files.text("/proc/self/mountinfo").value_or(""));
+  return mount.empty() ? "/sys/fs/cgroup" : mount;
 }
 
 }  // namespace
 
-std::vector<std::string> group_folders(const HostFiles& files, std::string_view controller) {
-  const auto groups = files.text("/proc/self/cgroup");
-  std::string root;
-  std::string path;
-  std::istringstream lines{groups.value_or("")};
-  // "4:cpu,cpuacct:/path", and "0::/path" of the unified hierarchy.
-  for (std::string line; std::getline(lines, line);) {
-    const std::size_t first = line.find(':');
-    const std::size_t second = line.find(':', first + 1);
-    if (first == std::string::npos || second == std::string::npos) continue;
-    const std::string list = line.substr(first + 1, second - first - 1);
-    const bool unified = list.empty() && root.empty();
-    if (!unified && !has_controller(list, controller)) continue;
-    root = list.empty() ? "/sys/fs/cgroup" : fmt::format("/sys/fs/cgroup/{}", list);
-    if (!list.empty() && !files.exists(root)) root = fmt::format("/sys/fs/cgroup/{}", controller);
-    path = line.substr(second + 1);
+std::vector<std::string> group_folders(const HostFiles& files, std::string_view controller,
+                                       const std::string& process) {
+  const auto groups = files.text(fmt::format("/proc/{}/cgroup", process));
+  const auto place = group_place(groups.value_or(""), controller);
+  if (!place) return {};
+  std::string top = mount_of_version2(files);
+  if (!place->controllers.empty()) {
+    top = fmt::format("/sys/fs/cgroup/{}", place->controllers);
+    if (!files.exists(top)) top = fmt::format("/sys/fs/cgroup/{}", controller);
   }
-  std::vector<std::string> folders;
-  constexpr std::size_t kDeepest = 64;
-  while (!root.empty() && folders.size() < kDeepest) {
-    const bool top = path.empty() || path == "/";
-    // A process in a name space of its own may be told a path that is not there.
-    if (const std::string folder = top ? root : root + path; files.exists(folder)) folders.push_back(folder);
-    if (top) break;
-    path.resize(path.rfind('/') == std::string::npos ? 0 : path.rfind('/'));
+  return folders_upwards(files, top + place->path, top);
+}
+
+std::vector<std::string> group_folders_of(const CheckedHost& host, const CheckedHost::Instance& instance,
+                                          std::string_view controller) {
+  if (instance.pid != 0) {
+    if (auto folders = group_folders(host.files, controller, fmt::format("{}", instance.pid));
+        !folders.empty())
+      return folders;
   }
-  return folders;
+  const auto own = group_place(host.files.text("/proc/self/cgroup").value_or(""), controller);
+  const bool inherited = !own || !own->controllers.empty() || !host.groups.problem.empty();
+  if (inherited) return group_folders(host.files, controller);
+  return folders_upwards(host.files, host.groups.folder, mount_of_version2(host.files));
 }
 
 Result<bool> has_capability(const HostFiles& files, unsigned capability) {

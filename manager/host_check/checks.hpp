@@ -76,9 +76,14 @@ HostFinding machine(const CheckedHost& host);
 /// The value of `key=value` on the kernel's command line, the last one; empty: not there.
 [[nodiscard]] std::string boot_value(std::string_view command_line, std::string_view key);
 
-/// The folders of the control groups that this process is in, its own first and then upwards, of the
-/// controller or of the unified hierarchy. Empty: there are none, or it cannot be known.
-[[nodiscard]] std::vector<std::string> group_folders(const HostFiles& files, std::string_view controller);
+/// The folders of the control groups in which a controller limits a process, its own first and then upwards.
+/// Empty: there are none, or it cannot be known. `process`: its number, or "self".
+[[nodiscard]] std::vector<std::string> group_folders(const HostFiles& files, std::string_view controller,
+                                                     const std::string& process = "self");
+/// The same of an instance: where its process is, or where its next one will be.
+[[nodiscard]] std::vector<std::string> group_folders_of(const CheckedHost& host,
+                                                        const CheckedHost::Instance& instance,
+                                                        std::string_view controller);
 
 /// A capability of this process is effective.
 [[nodiscard]] Result<bool> has_capability(const HostFiles& files, unsigned capability);

@@ -74,12 +74,13 @@ std::vector<HostFinding> check_host(const CheckedHost& host) {
 }
 
 CheckedHost this_host(const ManagerConfig& config) {
+  constexpr std::uint64_t kMib = 1U << 20;
   CheckedHost host{.files = HostFiles(), .instances = {}, .try_fifo = try_fifo};
   for (const InstanceConfig& instance : config.instances)
     host.instances.push_back({.name = instance.name,
                               .core = instance.core,
-                              .memory_limited = instance.memory_max_mib != 0,
-                              .pids_limited = instance.pids_max != 0});
+                              .memory_max = instance.memory_max_mib * kMib,
+                              .pids_max = instance.pids_max});
   return host;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -18,8 +19,10 @@ struct CheckedHost {
   struct Instance {
     std::string name;
     int core = -1;
-    bool memory_limited = false;  ///< by memory_max_mib
-    bool pids_limited = false;    ///< by pids_max
+    std::uint64_t memory_max = 0;  ///< bytes; 0: no limit
+    std::uint64_t pids_max = 0;    ///< 0: no limit
+    int pid = 0;                   ///< of its process; 0: it has none
+    std::string group = {};        ///< in the folder of groups
   };
   /// The control groups of the instances.
   struct Groups {

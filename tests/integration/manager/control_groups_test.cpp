@@ -1,5 +1,6 @@
 #include "manager/system/control_groups.hpp"
 
+#include <filesystem>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -73,6 +74,14 @@ TEST_F(GroupsOfInstances, HaveTheInstanceWithItsOomScore) {
   int score = 0;
   file >> score;
   EXPECT_EQ(score, 100);
+}
+
+TEST_F(GroupsOfInstances, AreToldByTheCheckOfTheHostIfAProcessIsNotInIts) {
+  const auto told = [&] { return plant_.ask(ControlVerb::check_host, "").text; };
+  EXPECT_FALSE(told().contains("without limits of its own")) << told();
+  std::filesystem::create_directory(folder_.path() + "/other");
+  std::ofstream(folder_.path() + "/other/cgroup.procs") << plant_.status("line1").pid << std::flush;
+  EXPECT_TRUE(told().contains("line1 is in /")) << told();
 }
 
 // Once, by the check of the host.

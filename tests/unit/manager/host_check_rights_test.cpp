@@ -134,11 +134,78 @@ TEST(HostCheckRights, FindAQuotaInAnyGroupAbove) {
   EXPECT_EQ(tree.look("cpu_quota").level, FindingLevel::warning);
 }
 
+// The manager is in one unit, and the instances in another one.
+TEST(HostCheckRights, LookAtTheGroupsInWhichInstancesAre) {
+  FakeTree tree;
+  tree.write("/proc/self/cgroup", "0::/system.slice/plchostd.service\n");
+  tree.write("/sys/fs/cgroup/system.slice/plchostd.service/cpu.max", "max 100000\n");
+  tree.write("/sys/fs/cgroup/system.slice/plchostd.service/cpuset.cpus.effective", "0\n");
+  const std::string groups = "/sys/fs/cgroup/system.slice/plchost-instances.service";
+  tree.write(groups + "/cpuset.cpus.effective", "2-3\n");
+  tree.write(groups + "/cpu.max", "max 100000\n");
+  tree.host.groups = {.folder = groups, .problem = "", .missing = {}};
+  EXPECT_EQ(tree.look("allowed_cores").level, FindingLevel::ok) << tree.look("allowed_cores").found;
+  EXPECT_EQ(tree.look("allowed_cores").found, "2-3 (" + groups + "/cpuset.cpus.effective)");
+  EXPECT_EQ(tree.look("cpu_quota").level, FindingLevel::ok);
+  tree.write(groups + "/cpu.max", "50000 100000\n");
+  EXPECT_THAT(tree.look("cpu_quota").found, HasSubstr(groups + "/cpu.max is '50000 100000'"));
+  tree.write(groups + "/cpu.max", "max 100000\n");
+  // A process from before an upgrade is still in the group of the manager.
+  tree.host.instances[0].pid = 10;
+  tree.write("/proc/10/cgroup", "0::/system.slice/plchostd.service\n");
+  EXPECT_EQ(tree.look("allowed_cores").subject, "core 2 (line1)");
+  tree.write("/proc/10/cgroup", "0::/other.slice/line1\n");
+  tree.write("/sys/fs/cgroup/other.slice/line1/cpuset.cpus.effective", "2\n");
+  EXPECT_EQ(tree.look("allowed_cores").level, FindingLevel::ok);
+  tree.write("/sys/fs/cgroup/other.slice/cpu.max", "20000 100000\n");
+  EXPECT_THAT(tree.look("cpu_quota").found, StartsWith("/sys/fs/cgroup/other.slice/cpu.max is "));
+}
+
+TEST(HostCheckRights, FindTheGroupsOfVersion2WhereTheyAreMounted) {
+  FakeTree tree;
+  tree.write("/proc/self/mountinfo", "38 31 0:35 / /sys/fs/cgroup/unified rw - cgroup2 cgroup2 rw\n");
+  tree.write("/proc/self/cgroup", "4:memory:/\n0::/a\n");
+  tree.write("/sys/fs/cgroup/unified/a/cpu.max", "50000 100000\n");
+  EXPECT_THAT(tree.look("cpu_quota").found, HasSubstr("/sys/fs/cgroup/unified/a/cpu.max is '50000 100000'"));
+}
+
+TEST(HostCheckRights, TellTheLimitsOfEachProcess) {
+  FakeTree tree;
+  tree.host.groups = {.folder = "/sys/fs/cgroup/a", .problem = "", .missing = {}};
+  tree.host.instances[0] = {
+      .name = "line1", .core = 2, .memory_max = 512U << 20, .pids_max = 100, .pid = 10, .group = "p.1"};
+  tree.host.instances[1] = {.name = "line2", .core = 3, .pid = 20, .group = "p.2"};
+  tree.write("/sys/fs/cgroup/a/p.1/cgroup.procs", "9\n10\n");
+  tree.write("/sys/fs/cgroup/a/p.1/memory.max", "536870912\n");
+  tree.write("/sys/fs/cgroup/a/p.1/pids.max", "100\n");
+  tree.write("/sys/fs/cgroup/a/p.2/cgroup.procs", "20\n");
+  tree.write("/sys/fs/cgroup/a/p.2/memory.max", "max\n");
+  tree.write("/sys/fs/cgroup/a/p.2/pids.max", "max\n");
+  EXPECT_EQ(tree.look("instance_limits").level, FindingLevel::ok) << tree.look("instance_limits").found;
+  // The kernel has refused it, or the configuration has another one since.
+  tree.write("/sys/fs/cgroup/a/p.1/pids.max", "max\n");
+  auto found = tree.look("instance_limits");
+  EXPECT_EQ(found.level, FindingLevel::warning);
+  EXPECT_EQ(found.found, "/sys/fs/cgroup/a; line1: pids.max is max, not 100");
+  EXPECT_THAT(found.advice, StartsWith("restart these instances"));
+  // Still in the group of the manager.
+  tree.write("/sys/fs/cgroup/a/p.1/cgroup.procs", "1\n");
+  tree.write("/proc/10/cgroup", "0::/system.slice/plchostd.service\n");
+  EXPECT_EQ(tree.look("instance_limits").level, FindingLevel::warning);
+  EXPECT_EQ(tree.look("instance_limits").found,
+            "/sys/fs/cgroup/a; line1 is in /system.slice/plchostd.service without limits of its own");
+  tree.host.instances[0].pid = 0;
+  tree.write("/sys/fs/cgroup/a/p.2/cgroup.procs", "1\n");
+  found = tree.look("instance_limits");
+  EXPECT_EQ(found.level, FindingLevel::note) << "nobody has asked for a limit";
+  EXPECT_EQ(found.found, "/sys/fs/cgroup/a; line2 is in another group without limits of its own");
+}
+
 TEST(HostCheckRights, NameTheLimitsOfInstancesThatDoNotHold) {
   FakeTree tree;
   tree.host.groups = {.folder = "/sys/fs/cgroup/a", .problem = "", .missing = {}};
-  tree.host.instances[0].memory_limited = true;
-  tree.host.instances[1].pids_limited = true;
+  tree.host.instances[0].memory_max = 512U << 20;
+  tree.host.instances[1].pids_max = 100;
   EXPECT_EQ(tree.look("instance_limits").level, FindingLevel::ok);
   EXPECT_EQ(tree.look("instance_limits").found, "/sys/fs/cgroup/a");
   tree.host.groups.missing = {{"memory", "busy"}};
