@@ -107,7 +107,7 @@ constexpr std::array kHostKeys = {
          .meaning =
              "user of the instances, see [Rights](install.md#rights). Another one needs a manager that "
              "is root; the manager's group is theirs, too"}),
-    host<&HostConfig::instance_groups, TextKey<AbsolutePathRule<kMaxPath>>>(
+    host<&HostConfig::instance_groups, TextKey<OptionalRule<AbsolutePathRule<kMaxPath>>>>(
         {.name = "instance_groups",
          .when = next_manager,
          .why = "running instances stay in their groups",

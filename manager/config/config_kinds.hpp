@@ -123,26 +123,31 @@ struct HostNameRule : NameRule<kMaxHostName> {
   }
 };
 
-/// A folder that is there or can be made.
-template <std::size_t Most>
-struct AbsoluteFolderRule {
-  static std::string form() { return fmt::format("an absolute path of up to {} characters", Most); }
-  static std::string wrong(const ConfigReading& reading, const std::string& path) {
-    if (!path.starts_with('/') || path.size() > Most) {
-      return fmt::format("\"{}\" is not allowed; allowed is {}", path.substr(0, kMaxPath), form());
-    }
-    if (!reading.surroundings.check_directories) return "";
-    const auto good = check_directory_can_be_made(path);
-    return good ? "" : good.error().describe();
-  }
-};
-
 template <std::size_t Most>
 struct AbsolutePathRule {
   static std::string form() { return fmt::format("an absolute path of up to {} characters", Most); }
   static std::string wrong(const ConfigReading&, const std::string& path) {
-    if (path.empty() || (path.starts_with('/') && path.size() <= Most)) return "";
+    if (path.starts_with('/') && path.size() <= Most) return "";
     return fmt::format("\"{}\" is not allowed; allowed is {}", path.substr(0, kMaxPath), form());
+  }
+};
+
+/// Of a key whose default is the empty text: none.
+template <class Rule>
+struct OptionalRule : Rule {
+  static std::string wrong(const ConfigReading& reading, const std::string& text) {
+    return text.empty() ? "" : Rule::wrong(reading, text);
+  }
+};
+
+/// A folder that is there or can be made.
+template <std::size_t Most>
+struct AbsoluteFolderRule : AbsolutePathRule<Most> {
+  static std::string wrong(const ConfigReading& reading, const std::string& path) {
+    std::string text = AbsolutePathRule<Most>::wrong(reading, path);
+    if (!text.empty() || !reading.surroundings.check_directories) return text;
+    const auto good = check_directory_can_be_made(path);
+    return good ? "" : good.error().describe();
   }
 };
 
