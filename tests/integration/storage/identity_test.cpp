@@ -2,7 +2,6 @@
 #include "api/security/identity.hpp"
 
 #include <filesystem>
-#include <map>
 #include <set>
 #include <string>
 #include <vector>
