@@ -121,7 +121,13 @@ void take_chunks(Input& input) {
       .argument = "a.so",
       .options = {{"size", std::to_string(number(input, kSize))}, {"sha256", std::string(64, 'a')}}};
   (void)table.begin(client, identity, request, now);
-  if (input.ConsumeBool()) (void)table.begin(client, identity, request, now);
+  std::vector<plc_SampleIdentity> others(input.ConsumeIntegralInRange<std::size_t>(0, 6));
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    ControlRequest other = request;
+    other.instance = "line" + std::to_string(number(input, static_cast<std::uint8_t>(i)));
+    others[i].sequence_number = static_cast<decltype(others[i].sequence_number)>(i + 1);
+    (void)table.begin(client, others[i], other, now);
+  }
   while (input.remaining_bytes() > 0) {
     std::array<std::uint8_t, kMost> bytes{};
     plc_DownloadChunk chunk{};
@@ -138,7 +144,9 @@ void take_chunks(Input& input) {
     const bool there = number(input, std::uint8_t{1}) % 2 == 1;
     if (!table.given_up(now, [there](const dds::Guid&) { return there; }).empty()) break;
   }
+  (void)table.repeat(identity);
   table.end(identity);
+  for (const plc_SampleIdentity& other : others) table.end(other);
   if (table.size() != 0) std::abort();
 }
 
