@@ -11,6 +11,8 @@ static _Atomic(ddsi_tran_read_fn_t) read_unfiltered;
 
 static ssize_t read_filtered(ddsi_tran_conn_t connection, unsigned char* buffer, size_t capacity,
                              bool allow_spurious, ddsi_locator_t* source) {
+  // Cyclone has read this pointer without an order: now what was stored before it is seen, on any processor.
+  (void)__atomic_load_n(&connection->m_read_fn, __ATOMIC_ACQUIRE);
   const ssize_t got = atomic_load(&read_unfiltered)(connection, buffer, capacity, allow_spurious, source);
   if (got <= 0 || (size_t)got > capacity) return got;
   return (ssize_t)atomic_load(&used_filter)(buffer, (size_t)got, capacity);

@@ -173,12 +173,17 @@ static void take_challenge(dds_security_authentication* instance, DDS_Security_I
   DDS_Security_DataHolder_deinit(&token);
 }
 
+// Cyclone reads the pointer to a function of ours without an order. So each of these reads it once more: then
+// what put_in_front() kept before is seen, on any processor.
+#define SEE_PLUGIN(function) (void)__atomic_load_n(&instance->function, __ATOMIC_ACQUIRE)
+
 static DDS_Security_ValidationResult_t validate_remote_identity(
     dds_security_authentication* instance, DDS_Security_IdentityHandle* remote,
     DDS_Security_AuthRequestMessageToken* local_request,
     const DDS_Security_AuthRequestMessageToken* remote_request, const DDS_Security_IdentityHandle local,
     const DDS_Security_IdentityToken* token, const DDS_Security_GUID_t* guid,
     DDS_Security_SecurityException* error) {
+  SEE_PLUGIN(validate_remote_identity);
   const DDS_Security_ValidationResult_t result = plugin.validate_remote_identity(
       instance, remote, local_request, remote_request, local, token, guid, error);
   if (result != DDS_SECURITY_VALIDATION_FAILED) note_begin(local, *remote, token, guid);
@@ -192,6 +197,7 @@ static DDS_Security_ValidationResult_t begin_handshake_request(dds_security_auth
                                                                const DDS_Security_IdentityHandle remote,
                                                                const DDS_Security_OctetSeq* participant_data,
                                                                DDS_Security_SecurityException* error) {
+  SEE_PLUGIN(begin_handshake_request);
   const DDS_Security_ValidationResult_t result =
       plugin.begin_handshake_request(instance, handshake, message, local, remote, participant_data, error);
   if (result != DDS_SECURITY_VALIDATION_FAILED) {
@@ -205,6 +211,7 @@ static DDS_Security_ValidationResult_t begin_handshake_reply(
     DDS_Security_HandshakeMessageToken* reply, const DDS_Security_HandshakeMessageToken* request,
     const DDS_Security_IdentityHandle remote, const DDS_Security_IdentityHandle local,
     const DDS_Security_OctetSeq* participant_data, DDS_Security_SecurityException* error) {
+  SEE_PLUGIN(begin_handshake_reply);
   const unsigned char* const challenge = challenge_in(request, "challenge1");
   take_challenge(instance, local, remote, challenge);
   const DDS_Security_ValidationResult_t result = plugin.begin_handshake_reply(
@@ -221,6 +228,7 @@ static DDS_Security_ValidationResult_t process_handshake(dds_security_authentica
                                                          const DDS_Security_HandshakeMessageToken* message,
                                                          const DDS_Security_HandshakeHandle handshake,
                                                          DDS_Security_SecurityException* error) {
+  SEE_PLUGIN(process_handshake);
   DDS_Security_IdentityHandle local = DDS_SECURITY_HANDLE_NIL;
   DDS_Security_IdentityHandle remote = DDS_SECURITY_HANDLE_NIL;
   pthread_mutex_lock(&mutex);
@@ -274,23 +282,33 @@ static void forget_identity(DDS_Security_IdentityHandle handle) {
 static DDS_Security_boolean return_identity_handle(dds_security_authentication* instance,
                                                    const DDS_Security_IdentityHandle handle,
                                                    DDS_Security_SecurityException* error) {
+  SEE_PLUGIN(return_identity_handle);
   // Before, because the plugin may give the same handle to another one right afterwards.
   forget_identity(handle);
   return plugin.return_identity_handle(instance, handle, error);
 }
 
+#undef SEE_PLUGIN
+
 // With the mutex. The threads of Cyclone read these pointers at each call. Several domains have one plugin,
 // so one that begins changes nothing for the others.
 static void put_in_front(dds_security_authentication* instance) {
-#define PUT_IN_FRONT(function)                                                     \
-  if (plugin.function != instance->function) plugin.function = instance->function; \
-  __atomic_store_n(&instance->function, function, __ATOMIC_RELEASE)
+#define KEEP(function) \
+  if (plugin.function != instance->function) plugin.function = instance->function
+#define PUT_IN_FRONT(function) __atomic_store_n(&instance->function, function, __ATOMIC_RELEASE)
   if (instance->begin_handshake_reply == begin_handshake_reply) return;
+  // All of them first: one of ours calls several of the plugin.
+  KEEP(validate_remote_identity);
+  KEEP(begin_handshake_request);
+  KEEP(begin_handshake_reply);
+  KEEP(process_handshake);
+  KEEP(return_identity_handle);
   PUT_IN_FRONT(validate_remote_identity);
   PUT_IN_FRONT(begin_handshake_request);
   PUT_IN_FRONT(begin_handshake_reply);
   PUT_IN_FRONT(process_handshake);
   PUT_IN_FRONT(return_identity_handle);
+#undef KEEP
 #undef PUT_IN_FRONT
 }
 

@@ -16,21 +16,23 @@ bool is_aligned(const void* address) noexcept {
   return reinterpret_cast<std::uintptr_t>(address) % kWord == 0;
 }
 
-// Registers have effects when they are touched: each access is made as it is written here.
+// Registers have effects when they are touched: each access is made as it is written here. A fault makes
+// outputs safe while a task writes them, so accesses are atomic.
 void read_word(std::byte* to, const std::byte* from) noexcept {
-  const std::uint32_t word = *reinterpret_cast<const volatile std::uint32_t*>(from);
+  const auto word = __atomic_load_n(reinterpret_cast<const volatile std::uint32_t*>(from), __ATOMIC_RELAXED);
   std::memcpy(to, &word, kWord);
 }
 void write_word(std::byte* to, const std::byte* from) noexcept {
   std::uint32_t word = 0;
   std::memcpy(&word, from, kWord);
-  *reinterpret_cast<volatile std::uint32_t*>(to) = word;
+  __atomic_store_n(reinterpret_cast<volatile std::uint32_t*>(to), word, __ATOMIC_RELAXED);
 }
 void read_byte(std::byte* to, const std::byte* from) noexcept {
-  *to = *const_cast<const volatile std::byte*>(from);
+  *to = std::byte{__atomic_load_n(reinterpret_cast<const volatile std::uint8_t*>(from), __ATOMIC_RELAXED)};
 }
 void write_byte(std::byte* to, const std::byte* from) noexcept {
-  *const_cast<volatile std::byte*>(to) = *from;
+  __atomic_store_n(reinterpret_cast<volatile std::uint8_t*>(to), std::to_integer<std::uint8_t>(*from),
+                   __ATOMIC_RELAXED);
 }
 
 template <class Word, class Byte>
