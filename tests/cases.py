@@ -13,7 +13,7 @@ runs again in a process of its own. A process that a case leaves running is a fa
 --retries  the tests that may run a second time if they fail (tests/retries.txt). Stalls of the machine are read from $PLCHOST_STALLS
 --skips    a list of tests (tests/skips.txt). A case is skipped without being run if its reason there begins with "not run:"
 --without  cases that run elsewhere, names with * and ?, separated by colons
---kind     of the build, for these lists: plain, address or thread
+--kind     of the build, for these lists: plain, address, thread or threads
 """
 
 import argparse

@@ -2,6 +2,7 @@
 # All tests, from nothing: packages, gates, build, tests, sanitizers, fuzzers.
 #   tests/run.sh           everything (what CI runs)
 #   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
+#   tests/run.sh --threads  more integration tests with the thread sanitizer than everything has: by hand (README.md)
 #   tests/run.sh NAME...   only tests whose name matches one of these (ctest -R), in the plain build
 #   tests/run.sh --help    this text
 # A test has one attempt, unless tests/retries.txt says why it has two. Up to three others of a build have two if the machine stood
@@ -13,13 +14,13 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 self=tests/run.sh
 case "${1:-}" in
-  "" | --quick | --step | --fuzz) ;;
+  "" | --quick | --threads | --step | --fuzz) ;;
   -h | --help)
     sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$self"
     exit
     ;;
   -*)
-    echo "$self: unknown option $1; allowed are --quick and --help" >&2
+    echo "$self: unknown option $1; allowed are --quick, --threads and --help" >&2
     exit 2
     ;;
 esac
@@ -144,6 +145,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
 }
 build_asan() { build_sanitized .build/asan "address;undefined" all; }
 build_tsan() { build_sanitized .build/tsan thread plchost_tests; }
+build_threads() { build_sanitized .build/threads thread plchost_tests -DPLCHOST_ALL_THREADS=ON; }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/c_files.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prose.py && tests/gates/prove.sh; }
 
 # ctest's own lines, and at the end what CI reads
@@ -154,8 +156,8 @@ tests() { # tests DIR OPTIONS...
   local reports=$own/reports/r code=0 per_core=4
   mkdir -p -m 1777 "${reports%/*}"
   # ctest counts quarters of a core (tests/CMakeLists.txt): on each core four tests that wait, or one that computes. Processes
-  # with the address sanitizer take seconds to begin, so two tests fill a core.
-  [ "$1" != .build/asan ] || per_core=2
+  # with the address sanitizer take seconds to begin, so two tests fill a core. So do hosts with the thread sanitizer.
+  case "$1" in .build/asan | .build/threads) per_core=2 ;; esac
   ASAN_OPTIONS=$ASAN_OPTIONS:log_path=$reports UBSAN_OPTIONS=$UBSAN_OPTIONS:log_path=$reports TSAN_OPTIONS=$TSAN_OPTIONS:log_path=$reports \
     tests/suite.py --jobs $((per_core * jobs)) "$@" || code=1
   head -n 60 "$reports".* 2>/dev/null && code=1
@@ -219,6 +221,13 @@ case "${1:-}" in
     run "fast tests" tests "$build" -C whole -LE 'case|slow'
     count
     ;;
+  --threads)
+    steps=3
+    run "packages" .ci/packages test
+    run "thread sanitizer, all tests: build" build_threads
+    run "thread sanitizer, all tests" tests .build/threads "${whole[@]}"
+    count
+    ;;
   "")
     run "packages" .ci/packages test
     tests/left_behind.py begin "$own/before"
@@ -230,7 +239,7 @@ case "${1:-}" in
     join build_asan "address and undefined sanitizers: build"
     run "address and undefined sanitizers: tests" tests .build/asan "${whole[@]}"
     count
-    # Of the integration tests only those of the API and of Modbus (tests/README.md, tests/skips.txt).
+    # Of the integration tests a share (tests/README.md, tests/skips.txt).
     join build_tsan "thread sanitizer: build"
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
