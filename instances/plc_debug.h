@@ -6,7 +6,7 @@
  * build, which the manager refuses where its configuration says "allow_debug = false".
  *
  *     static const unsigned int lines[] = {12, 13};
- *     static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "main.st", lines, 2, 0, 0, 0};
+ *     static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "main.st", lines, 2, 0, 0, 0, 0, 0};
  *
  *     static void main_body(struct Main* self) {
  *       PLC_ENTER(main_pou, self);
@@ -20,13 +20,18 @@
  * them. Others that lie on the stack, as those of a function do, are declared with the POU:
  *
  *     static const Plc_Local locals[] = {{"x", PLC_TYPE_INT, 0, 0, 0}, {"sum", PLC_TYPE_DINT, 0, 0, 0}};
- *     static Plc_Pou add_pou = {sizeof(Plc_Pou), "Add", "main.st", add_lines, 1, 0, locals, 2};
+ *     static Plc_Pou add_pou = {sizeof(Plc_Pou), "Add", "main.st", add_lines, 1, 0, locals, 2, 0, 0};
  *
  *     static int add(short x) {
  *       int sum = 0;
  *       void* const addresses[] = {&x, &sum};
  *       PLC_ENTER_LOCALS(add_pou, 0, addresses, 0);
  *       ...
+ *
+ * An array among them has a "[]" in its name for each dimension. Its address is that of its first element,
+ * and a row in pArrays of the POU tells its dimensions:
+ *
+ *     {"cells[]", PLC_TYPE_INT, 0, 0, 0}  and  {2, 1, {{1, 8, sizeof(short)}}}   if it has number 2
  *
  * A statement costs one store and one test of a word as long as nobody debugs. Only the thread of the task
  * that comes to a breakpoint halts; it needs no signal, no right and no other process.
@@ -47,7 +52,7 @@ extern "C" {
 
 /* A variable that each call has for itself: a parameter, a local variable, the result of a function. */
 typedef struct {
-  const char* pszName;  /* as that of a declared variable, without "[]" */
+  const char* pszName;  /* as that of a declared variable */
   unsigned int dwType;  /* PLC_TYPE_... of plc_variables.h */
   unsigned int dwBytes; /* strings: of its memory; others: 0 */
   unsigned int
@@ -55,16 +60,25 @@ typedef struct {
   unsigned int dwLastLine; /* of a POU may have variables of one name. Both 0: it is there for all */
 } Plc_Local;
 
+/* The dimensions of a local variable that is an array. */
+typedef struct {
+  unsigned int dwLocal;     /* its number in pLocals */
+  unsigned int nDimensions; /* as many as its name has "[]" */
+  Plc_Dimension aDimensions[PLC_MAX_DIMENSIONS];
+} Plc_LocalArray;
+
 /* A program, function block or function. It is there until plc_app_exit. */
 typedef struct {
-  unsigned int dwSize;          /* sizeof(Plc_Pou) */
-  const char* pszName;          /* 1 to 63 letters, digits and _ */
-  const char* pszFile;          /* the source file, as the user calls it: 1 to 255 characters */
-  const unsigned int* pdwLines; /* the lines at which a statement begins, ascending, each once */
-  unsigned int nLines;          /* 1 to PLC_MAX_POU_LINES */
-  unsigned int dwNumber;        /* the runtime's */
-  const Plc_Local* pLocals;     /* null: none */
-  unsigned int nLocals;         /* 0 to PLC_MAX_POU_LOCALS */
+  unsigned int dwSize;           /* sizeof(Plc_Pou) */
+  const char* pszName;           /* 1 to 63 letters, digits and _ */
+  const char* pszFile;           /* the source file, as the user calls it: 1 to 255 characters */
+  const unsigned int* pdwLines;  /* the lines at which a statement begins, ascending, each once */
+  unsigned int nLines;           /* 1 to PLC_MAX_POU_LINES */
+  unsigned int dwNumber;         /* the runtime's */
+  const Plc_Local* pLocals;      /* null: none */
+  unsigned int nLocals;          /* 0 to PLC_MAX_POU_LOCALS */
+  const Plc_LocalArray* pArrays; /* null: none. dwSize of a build without these two ends here */
+  unsigned int nArrays;
 } Plc_Pou;
 
 /* A call of a POU that has not returned: made by PLC_ENTER or PLC_ENTER_LOCALS on the stack of the thread. */

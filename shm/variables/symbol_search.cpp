@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
+#include "shm/variables/indexed_name.hpp"
 #include "shm/variables/symbol_page.hpp"
 
 namespace plchost {
@@ -192,50 +193,71 @@ std::vector<VariableSymbol>::const_iterator SymbolTable::find_place(std::string_
   return std::ranges::lower_bound(symbols_, canonical, before, &VariableSymbol::name);
 }
 
-Result<VariableElement> SymbolTable::find(std::string_view name) const {
+Result<IndexedName> IndexedName::parse(std::string_view name) {
   const auto tokens = tokens_of(name);
   if (!tokens) return bad_index(name);
-  std::string canonical;
-  std::vector<std::optional<std::int64_t>> indexes;
+  IndexedName indexed;
   for (const Token& token : *tokens) {
     if (token.kind == Token::Kind::index) {
-      canonical += "[]";
-      indexes.push_back(token.index);
+      indexed.canonical += "[]";
+      indexed.indexes.push_back(token.index);
     } else {
-      canonical += token.kind == Token::Kind::any ? '*' : token.character;
+      indexed.canonical += token.kind == Token::Kind::any ? '*' : token.character;
     }
   }
-  const auto found = find_place(canonical);
-  if (found == symbols_.end() || !same_variable_name(found->name, canonical))
-    return not_found(name, canonical);
+  return indexed;
+}
+
+Result<std::uint32_t> element_number(const VariableSymbol& symbol, const IndexedName& indexed) {
   Places places{};
-  for (std::size_t d = 0; d < indexes.size(); ++d) {
-    const VariableDimension& dimension = found->dimensions[d];
-    if (!indexes[d] || !in_range(dimension, *indexes[d])) {
-      return failure(
-          ErrorCode::invalid_argument,
-          fmt::format("'{}': it is {}; allowed as index {} are {} to {}", shown(name), type_text(*found),
-                      d + 1, dimension.first, std::int64_t{dimension.first} + dimension.count - 1));
+  for (std::size_t d = 0; d < indexed.indexes.size(); ++d) {
+    const auto& index = indexed.indexes[d];
+    const VariableDimension& dimension = symbol.dimensions[d];
+    if (!index || !in_range(dimension, *index)) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("it is {}; allowed as index {} are {} to {}", type_text(symbol), d + 1,
+                                 dimension.first, std::int64_t{dimension.first} + dimension.count - 1));
     }
-    places.at(d) = static_cast<std::uint32_t>(*indexes[d] - dimension.first);
+    places.at(d) = static_cast<std::uint32_t>(*index - dimension.first);
   }
-  return VariableElement{.symbol = static_cast<std::uint32_t>(found - symbols_.begin()),
-                         .element = element_of(*found, places)};
+  return element_of(symbol, places);
+}
+
+bool same_without_brackets(std::string_view left, std::string_view right) noexcept {
+  const auto next = [](std::string_view& text) {
+    text.remove_prefix(std::min(text.find_first_not_of("[]"), text.size()));
+    const std::string_view character = text.substr(0, 1);
+    text.remove_prefix(character.size());
+    return character;
+  };
+  for (;;) {
+    const std::string_view character = next(left);
+    if (!same_variable_name(character, next(right))) return false;
+    if (character.empty()) return true;
+  }
+}
+
+Error other_dimensions(std::string_view name, const VariableSymbol& symbol) {
+  return {.code = ErrorCode::invalid_argument,
+          .system_errno = 0,
+          .message = fmt::format(
+              "'{}': it is {}; name {}", shown(name), type_text(symbol),
+              symbol.dimensions.empty() ? symbol.name : "an element, as " + element_name(symbol, 0))};
+}
+
+Result<VariableElement> SymbolTable::find(std::string_view name) const {
+  PLCHOST_TRY_ASSIGN(const auto indexed, IndexedName::parse(name));
+  const auto found = find_place(indexed.canonical);
+  if (found == symbols_.end() || !same_variable_name(found->name, indexed.canonical))
+    return not_found(name, indexed.canonical);
+  auto element = element_number(*found, indexed);
+  if (!element) return failure_in(fmt::format("'{}'", shown(name)), std::move(element).error());
+  return VariableElement{.symbol = static_cast<std::uint32_t>(found - symbols_.begin()), .element = *element};
 }
 
 std::unexpected<Error> SymbolTable::not_found(std::string_view name, std::string_view canonical) const {
-  const auto plain = [](std::string_view text) {
-    std::string without(text);
-    std::erase_if(without, [](char c) { return c == '[' || c == ']'; });
-    return without;
-  };
-  const std::string wanted = plain(canonical);
   for (const VariableSymbol& symbol : symbols_) {
-    if (!same_variable_name(plain(symbol.name), wanted)) continue;
-    return failure(
-        ErrorCode::invalid_argument,
-        fmt::format("'{}': it is {}; name {}", shown(name), type_text(symbol),
-                    symbol.dimensions.empty() ? symbol.name : "an element, as " + element_name(symbol, 0)));
+    if (same_without_brackets(symbol.name, canonical)) return std::unexpected(other_dimensions(name, symbol));
   }
   const auto begins_with = [&](const std::string& prefix) -> const VariableSymbol* {
     const auto place = find_place(prefix);

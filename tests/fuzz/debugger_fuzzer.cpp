@@ -75,7 +75,8 @@ void make_breakpoint(std::string_view text) {
 
 void find_place(std::string_view text) {
   static constexpr std::array kLines = {3U, 7U, 4'000'000'000U};
-  static Plc_Pou pou = {sizeof(Plc_Pou), "Main", "src/main.st", kLines.data(), kLines.size(), 0, nullptr, 0};
+  static Plc_Pou pou = {sizeof(Plc_Pou), "Main", "src/main.st", kLines.data(), kLines.size(), 0, nullptr, 0,
+                        nullptr,         0};
   static const PouCollection pous = [] {
     PouCollection made;
     if (made.declare(&pou) != ERR_OK) std::abort();

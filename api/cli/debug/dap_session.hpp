@@ -50,6 +50,10 @@ class DapSession {
   [[nodiscard]] static bool is_of_locals(std::int64_t reference) noexcept {
     return reference % kFramesOfThread / kFrames * kFrames == kLocals;
   }
+  /// The number of the local variables of a frame; of one that has this number already the same.
+  [[nodiscard]] static std::int64_t locals_of(std::int64_t frame) noexcept {
+    return frame / kFramesOfThread * kFramesOfThread + kLocals + frame % kFramesOfThread % kFrames;
+  }
 
   [[nodiscard]] Answer carry_out(const std::string& command, const Json& arguments);
   [[nodiscard]] Answer attach(const Json& arguments);
@@ -69,12 +73,24 @@ class DapSession {
   [[nodiscard]] Result<void> let_others_go(const std::string& task);
   [[nodiscard]] Answer pause(const Json& arguments);
   [[nodiscard]] Answer elements_of(std::int64_t reference, const Json& arguments);
+  /// An array that the client was shown.
+  struct ShownArray {
+    ExpandedArray array;
+    std::int64_t locals = 0;  ///< the number of the local variables that it is of; 0: it is none
+    bool operator==(const ShownArray&) const = default;
+  };
   /// Null: it is of no array.
-  [[nodiscard]] const ExpandedArray* array_at(std::int64_t reference) const noexcept;
+  [[nodiscard]] const ShownArray* array_at(std::int64_t reference) const noexcept;
+  /// Gives an array a number that its client expands it by.
+  void make_expandable(Json& told, std::string_view type, std::int64_t locals);
+  [[nodiscard]] Json local_json(const Json& local, std::int64_t locals);
+  /// Elements `first` to `end` - 1.
+  [[nodiscard]] Answer declared_elements(const ExpandedArray& array, std::uint64_t first, std::uint64_t end);
+  [[nodiscard]] Answer local_elements(const ShownArray& shown, std::uint64_t first, std::uint64_t end) const;
   /// Without `prefix` in its name. An array gets a number to be expanded by.
   [[nodiscard]] Json variable_json(const plc_VariableRecord& variable, std::string_view prefix);
   /// The value that a name means in a frame.
-  [[nodiscard]] Answer evaluated(const Json& frame, const std::string& name, const std::string& context);
+  [[nodiscard]] Answer evaluated(std::int64_t number, const std::string& name, const std::string& context);
   /// Writes what the name means in a frame.
   [[nodiscard]] Answer written(std::int64_t frame, const std::string& name, const std::string& value);
   [[nodiscard]] Answer written_variable(const std::string& instance, const std::string& name,
@@ -101,7 +117,8 @@ class DapSession {
   Json state_;
   std::vector<std::string> tasks_;  // thread 1 is the first
   DebugNews news_;
-  std::vector<ExpandedArray> arrays_;                      // each that the client was shown
+  std::vector<ShownArray> arrays_;
+  std::map<std::string, std::size_t> array_numbers_;
   std::set<std::string> halted_;                           // as the client was told
   std::set<std::string> sources_;                          // paths of the client
   std::map<std::string, std::string> paths_;               // of those, by the file of their breakpoints

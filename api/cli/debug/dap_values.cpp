@@ -8,6 +8,7 @@
 #include "api/cli/debug/foreign_json.hpp"
 #include "api/cli/rows/variable_rows.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/trimmed.hpp"
 
 namespace plchost {
@@ -30,19 +31,48 @@ std::string without_mark(std::string value) {
   return value;
 }
 
-Json local_json(const Json& local) {
-  const std::string name = local.value("name", "");
-  return {{"name", name},
-          {"evaluateName", name},
-          {"value", local.value("value", "")},
-          {"type", local.value("type", "")},
-          {"variablesReference", 0}};
+/// Of an array, in one answer.
+constexpr std::uint64_t kMostElements = 131'072;
+/// Bytes of names in a request to the host.
+constexpr std::size_t kMostNames = 8000;
+
+/// The children that a client asks for: "start" and "count" of those that "filter" means. 0 and none mean
+/// all.
+struct Part {
+  std::uint64_t first = 0;
+  std::uint64_t end = 0;
+  bool all = false;  ///< the client knows of no parts
+
+  Part(const Json& arguments, std::uint64_t size, std::string_view kind) {
+    const std::string filter = text_in(arguments, "filter");
+    if (!filter.empty() && filter != kind) return;
+    const auto at_least_0 = [&](const char* key) {
+      return static_cast<std::uint64_t>(std::max<std::int64_t>(number_in(arguments, key), 0));
+    };
+    const std::uint64_t count = at_least_0("count");
+    first = std::min(at_least_0("start"), size);
+    end = first + std::min(count == 0 ? size : count, size - first);
+    all = count == 0;
+  }
+};
+constexpr std::string_view kIndexed = "indexed";
+constexpr std::string_view kNamed = "named";
+
+Json asked_children(Json children, const Json& arguments) {
+  const Part part(arguments, children.size(), kNamed);
+  children.erase(children.begin() + static_cast<std::ptrdiff_t>(part.end), children.end());
+  children.erase(children.begin(), children.begin() + static_cast<std::ptrdiff_t>(part.first));
+  return Json{{"variables", std::move(children)}};
 }
 
-/// Of an array, in one answer.
-constexpr std::uint64_t kMostElements = 1024;
-/// Bytes of names in a request to the host.
-constexpr std::size_t kMostNames = 4000;
+Json element_json(const ExpandedArray& array, std::uint64_t number, const std::string& value) {
+  const std::string whole = array.element(number);
+  return {{"name", array.label(whole)},
+          {"evaluateName", whole},
+          {"value", value},
+          {"type", array.element_type()},
+          {"variablesReference", 0}};
+}
 
 }  // namespace
 
@@ -55,35 +85,65 @@ Json DapSession::variable_json(const plc_VariableRecord& variable, std::string_v
             {"value", marked_value(variable)},
             {"type", dds::text_of(variable.type)},
             {"variablesReference", 0}};
-  const auto array = ExpandedArray::of(whole, dds::text_of(variable.type));
-  if (!array) return told;
-  const auto known = std::ranges::find(arrays_, *array);
-  told["variablesReference"] = kArrays + (known - arrays_.begin());
-  told["indexedVariables"] = array->elements();
-  if (known == arrays_.end()) arrays_.push_back(*array);
+  make_expandable(told, dds::text_of(variable.type), 0);
   return told;
 }
 
-const ExpandedArray* DapSession::array_at(std::int64_t reference) const noexcept {
+Json DapSession::local_json(const Json& local, std::int64_t locals) {
+  const std::string name = local.value("name", "");
+  Json told{{"name", name},
+            {"evaluateName", name},
+            {"value", value_of_local(local)},
+            {"type", local.value("type", "")},
+            {"variablesReference", 0}};
+  make_expandable(told, local.value("type", ""), locals);
+  return told;
+}
+
+void DapSession::make_expandable(Json& told, std::string_view type, std::int64_t locals) {
+  const std::string name = told.value("evaluateName", "");
+  auto array = ExpandedArray::of(name, type);
+  if (!array) return;
+  told["indexedVariables"] = array->elements();
+  told["namedVariables"] = 0;
+  const auto [known, is_new] =
+      array_numbers_.try_emplace(fmt::format("{} {} {}", locals, name, type), arrays_.size());
+  told["variablesReference"] = kArrays + static_cast<std::int64_t>(known->second);
+  if (is_new) arrays_.push_back({.array = *std::move(array), .locals = locals});
+}
+
+const DapSession::ShownArray* DapSession::array_at(std::int64_t reference) const noexcept {
   const std::int64_t place = reference - kArrays;
   if (place < 0 || place >= static_cast<std::int64_t>(arrays_.size())) return nullptr;
   return &arrays_[static_cast<std::size_t>(place)];
 }
 
-// A client asks for a part of a long array, or gets the begin of it.
 DapSession::Answer DapSession::elements_of(std::int64_t reference, const Json& arguments) {
-  const ExpandedArray* const found = array_at(reference);
+  const ShownArray* const found = array_at(reference);
   if (found == nullptr) return failure(ErrorCode::not_found, "there is no such array");
-  const ExpandedArray array = *found;
-  const auto start = static_cast<std::uint64_t>(std::max<std::int64_t>(number_in(arguments, "start"), 0));
-  const auto wanted = static_cast<std::uint64_t>(std::max<std::int64_t>(number_in(arguments, "count"), 0));
-  const std::uint64_t first = std::min(start, array.elements());
-  const std::uint64_t most = wanted == 0 ? kMostElements : std::min(wanted, kMostElements);
-  const std::uint64_t end = first + std::min(most, array.elements() - first);
+  const ShownArray shown = *found;
+  const Part part(arguments, shown.array.elements(), kIndexed);
+  const std::uint64_t end = part.first + std::min(part.end - part.first, kMostElements);
+  PLCHOST_TRY_ASSIGN(auto made, shown.locals == 0 ? declared_elements(shown.array, part.first, end)
+                                                  : local_elements(shown, part.first, end));
+  const std::uint64_t left = part.end - part.first - made.size();
+  if (left > 0 && (part.all || shown.locals != 0)) {
+    made.push_back({{"name", "..."},
+                    {"value", fmt::format("{} not told", count_text(left, "element"))},
+                    {"variablesReference", 0}});
+  }
+  return Json{{"variables", std::move(made)}};
+}
+
+DapSession::Answer DapSession::declared_elements(const ExpandedArray& array, std::uint64_t first,
+                                                 std::uint64_t end) {
   Json made = Json::array();
   VariableQuery query;
   std::size_t bytes = 0;
-  const auto take = [&]() -> Result<void> {
+  for (std::uint64_t i = first; i < end; ++i) {
+    query.patterns.push_back(array.element(i));
+    bytes += query.patterns.back().size() + 1;
+    if (bytes + kMaxVariableName <= kMostNames && i + 1 != end) continue;
     PLCHOST_TRY_ASSIGN(const auto values, link_.listed(std::exchange(query, {})));
     for (const auto& value : values) {
       Json element = variable_json(value, "");
@@ -91,16 +151,22 @@ DapSession::Answer DapSession::elements_of(std::int64_t reference, const Json& a
       made.push_back(std::move(element));
     }
     bytes = 0;
-    return {};
-  };
-  for (std::uint64_t i = first; i < end; ++i) {
-    query.patterns.push_back(array.element(i));
-    bytes += query.patterns.back().size() + 1;
-    if (bytes > kMostNames || i + 1 == end) {
-      PLCHOST_TRY(take());
-    }
   }
-  return Json{{"variables", std::move(made)}};
+  return made;
+}
+
+// Those that the state tells.
+DapSession::Answer DapSession::local_elements(const ShownArray& shown, std::uint64_t first,
+                                              std::uint64_t end) const {
+  const Json locals = frame_at(shown.locals).value("locals", Json::array());
+  const auto found = std::ranges::find_if(
+      locals, [&](const Json& local) { return local.value("name", "") == shown.array.name(); });
+  if (found == locals.end()) return failure(ErrorCode::wrong_state, "there is no such array any more");
+  const Json elements = found->value("elements", Json::array());
+  Json made = Json::array();
+  for (std::uint64_t i = first; i < std::min<std::uint64_t>(end, elements.size()); ++i)
+    made.push_back(element_json(shown.array, i, elements[i].get<std::string>()));
+  return made;
 }
 
 Json DapSession::frame_at(std::int64_t number) const {
@@ -120,6 +186,8 @@ DapSession::Answer DapSession::scopes(const Json& arguments) {
   if (frame.contains("locals") || frame.contains("locals_left_out")) {
     scopes.push_back({{"name", "Locals"},
                       {"variablesReference", number + kLocals},
+                      {"namedVariables", frame.value("locals", Json::array()).size()},
+                      {"indexedVariables", 0},
                       {"expensive", false},
                       {"presentationHint", "locals"}});
   }
@@ -138,17 +206,19 @@ DapSession::Answer DapSession::scopes(const Json& arguments) {
 DapSession::Answer DapSession::variables(const Json& arguments) {
   const std::int64_t reference = number_in(arguments, "variablesReference");
   if (reference >= kArrays) return elements_of(reference, arguments);
+  if (text_in(arguments, "filter") == kIndexed) return Json{{"variables", Json::array()}};
   const Json frame = frame_at(reference);
   Json made = Json::array();
   if (is_of_globals(reference)) {
     PLCHOST_TRY_ASSIGN(const auto globals, link_.globals());
     for (const auto& variable : globals) made.push_back(variable_json(variable, ""));
-    return Json{{"variables", std::move(made)}};
+    return asked_children(std::move(made), arguments);
   }
   if (is_of_locals(reference)) {
     PLCHOST_TRY(local_in(frame, ""));
-    for (const Json& local : frame.value("locals", Json::array())) made.push_back(local_json(local));
-    return Json{{"variables", std::move(made)}};
+    for (const Json& local : frame.value("locals", Json::array()))
+      made.push_back(local_json(local, reference));
+    return asked_children(std::move(made), arguments);
   }
   const std::string instance = frame.value("instance", "");
   if (!instance.empty()) {
@@ -157,7 +227,7 @@ DapSession::Answer DapSession::variables(const Json& arguments) {
       for (const auto& variable : *found) made.push_back(variable_json(variable, instance + "."));
     }
   }
-  return Json{{"variables", std::move(made)}};
+  return asked_children(std::move(made), arguments);
 }
 
 DapSession::Answer DapSession::written_variable(const std::string& instance, const std::string& name,
@@ -174,16 +244,16 @@ DapSession::Answer DapSession::written_local(std::int64_t frame, const std::stri
   PLCHOST_TRY(link_.write_local(tasks_[thread - 1], frame % kFramesOfThread % kFrames, name, value));
   PLCHOST_TRY_ASSIGN(state_, link_.state());
   const Json found = frame_at(frame);
-  PLCHOST_TRY_ASSIGN(const auto* const now, local_in(found, name));
-  if (now != nullptr) return local_json(*now);
+  PLCHOST_TRY_ASSIGN(const auto now, local_in(found, name));
+  if (!now.is_null()) return local_json(now, locals_of(frame));
   return failure(ErrorCode::wrong_state, "the task has gone on meanwhile");
 }
 
 DapSession::Answer DapSession::written(std::int64_t frame, const std::string& name,
                                        const std::string& value) {
   const Json found = frame_at(frame);
-  PLCHOST_TRY_ASSIGN(const auto* const local, local_in(found, name));
-  if (local != nullptr) return written_local(frame, name, value);
+  PLCHOST_TRY_ASSIGN(const auto local, local_in(found, name));
+  if (!local.is_null()) return written_local(frame, name, value);
   return written_variable(found.value("instance", ""), name, value);
 }
 
@@ -192,8 +262,11 @@ DapSession::Answer DapSession::set_variable(const Json& arguments) {
   const std::int64_t reference = number_in(arguments, "variablesReference");
   const std::string name = text_in(arguments, "name");
   const std::string value = without_mark(text_in(arguments, "value"));
-  if (const ExpandedArray* const array = array_at(reference))
-    return written_variable("", array->labelled(name), value);
+  if (const ShownArray* const shown = array_at(reference)) {
+    const std::string whole = shown->array.labelled(name);
+    return shown->locals == 0 ? written_variable("", whole, value)
+                              : written_local(shown->locals, whole, value);
+  }
   if (is_of_globals(reference)) return written_variable("", name, value);
   if (is_of_locals(reference)) return written_local(reference, name, value);
   return written_variable(frame_at(reference).value("instance", ""), name, value);
@@ -203,27 +276,29 @@ DapSession::Answer DapSession::set_variable(const Json& arguments) {
 DapSession::Answer DapSession::evaluate(const Json& arguments) {
   const std::string expression = text_in(arguments, "expression");
   const std::int64_t number = number_in(arguments, "frameId");
-  const Json frame = frame_at(number);
   const auto trim = [](std::string_view text) { return std::string(trimmed(text)); };
   const std::size_t assign = expression.find(":=");
   Answer made = Json();
   if (assign != std::string::npos && text_in(arguments, "context") == "repl") {
     made = written(number, trim(expression.substr(0, assign)), trim(expression.substr(assign + 2)));
   } else {
-    made = evaluated(frame, trim(expression), text_in(arguments, "context"));
+    made = evaluated(number, trim(expression), text_in(arguments, "context"));
   }
   if (!made) return made;
   Json result{{"result", (*made)["value"]},
               {"type", (*made)["type"]},
               {"variablesReference", (*made)["variablesReference"]}};
-  if (made->contains("indexedVariables")) result["indexedVariables"] = (*made)["indexedVariables"];
+  for (const char* const key : {"indexedVariables", "namedVariables"}) {
+    if (made->contains(key)) result[key] = (*made)[key];
+  }
   return result;
 }
 
-DapSession::Answer DapSession::evaluated(const Json& frame, const std::string& name,
+DapSession::Answer DapSession::evaluated(std::int64_t number, const std::string& name,
                                          const std::string& context) {
-  PLCHOST_TRY_ASSIGN(const auto* const local, local_in(frame, name));
-  if (local != nullptr) return local_json(*local);
+  const Json frame = frame_at(number);
+  PLCHOST_TRY_ASSIGN(const auto local, local_in(frame, name));
+  if (!local.is_null()) return local_json(local, locals_of(number));
   const auto variable = link_.variable(frame.value("instance", ""), name);
   if (!variable) return std::unexpected(error_in_frame(frame, variable.error()));
   Json made = variable_json(*variable, "");

@@ -58,7 +58,7 @@ void print_halt(const Json& task) {
 }
 
 void print_local(const Json& local) {
-  print_line(fmt::format("{} = {}", local.value("name", ""), local.value("value", "")));
+  print_line(fmt::format("{} = {}", local.value("name", ""), value_of_local(local)));
 }
 
 void print_variable(const plc_VariableRecord& variable) {
@@ -250,9 +250,9 @@ Result<void> DebugConsole::print(const std::string& name) {
   PLCHOST_TRY_ASSIGN(const auto frame, current_frame());
   if (name.empty()) return print_all(frame);
   if (name.find_first_of("*?") != std::string::npos) return print_variables(name);
-  PLCHOST_TRY_ASSIGN(const auto* const local, local_in(frame, name));
-  if (local != nullptr) {
-    print_local(*local);
+  PLCHOST_TRY_ASSIGN(const auto local, local_in(frame, name));
+  if (!local.is_null()) {
+    print_local(local);
     return {};
   }
   const auto one = link_.variable(frame.value("instance", ""), name);
@@ -291,8 +291,8 @@ Result<void> DebugConsole::set(const std::string& order) {
   while (begin < order.size() && order[begin] == ' ') ++begin;
   const std::string value = order.substr(begin);
   PLCHOST_TRY_ASSIGN(const auto frame, current_frame());
-  PLCHOST_TRY_ASSIGN(const auto* const local, local_in(frame, name));
-  if (local != nullptr) {
+  PLCHOST_TRY_ASSIGN(const auto local, local_in(frame, name));
+  if (!local.is_null()) {
     PLCHOST_TRY(link_.write_local(task_, frame_, name, value));
   } else {
     PLCHOST_TRY_ASSIGN(name, link_.write(frame.value("instance", ""), name, value));

@@ -5,8 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "api/cli/debug/expanded_array.hpp"
 #include "shm/base/names.hpp"
-#include "shm/variables/variable_symbol.hpp"
+#include "shm/variables/indexed_name.hpp"
 
 namespace plchost {
 
@@ -14,11 +15,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// As IEC 61131-3 compares names.
-bool same_name(std::string_view left, std::string_view right) {
-  const auto folded = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
-  return std::ranges::equal(left, right, {}, folded, folded);
-}
+// Of an array in one line.
+constexpr std::size_t kShownElements = 64;
 
 }  // namespace
 
@@ -30,7 +28,46 @@ const Json* task_in(const Json& state, std::string_view name) {
   return found == tasks.end() ? nullptr : &*found;
 }
 
-Result<const Json*> local_in(const Json& frame, std::string_view name) {
+std::string value_of_local(const Json& local) {
+  const auto elements = local.find("elements");
+  if (elements == local.end()) return local.value("value", "");
+  const auto array = ExpandedArray::of(local.value("name", ""), local.value("type", ""));
+  std::string text = "[";
+  std::size_t told = 0;
+  for (const Json& element : *elements) {
+    if (told == kShownElements) break;
+    text += fmt::format("{}{}", told++ == 0 ? "" : ", ", element.get<std::string>());
+  }
+  return text + (array && array->elements() > told ? ", ...]" : "]");
+}
+
+namespace {
+
+Result<Json> element_of(const Json& local, const IndexedName& indexed) {
+  const std::string name = local.value("name", "");
+  const auto array = ExpandedArray::of(name, local.value("type", ""));
+  const Json elements = local.value("elements", Json::array());
+  const bool is_whole =
+      std::ranges::none_of(indexed.indexes, [](const auto& index) { return index.has_value(); });
+  if (is_whole) {
+    Json whole = local;
+    whole["value"] = value_of_local(local);
+    return whole;
+  }
+  if (!array) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{} is no array: it is {}", shown(name), local.value("type", "")));
+  }
+  PLCHOST_TRY_ASSIGN(const auto number, array->number(indexed));
+  std::string value = number < elements.size()
+                          ? elements[number].get<std::string>()
+                          : fmt::format("(only the first {} elements are told)", elements.size());
+  return Json{{"name", array->element(number)}, {"type", array->element_type()}, {"value", std::move(value)}};
+}
+
+}  // namespace
+
+Result<Json> local_in(const Json& frame, std::string_view name) {
   if (frame.contains("locals_left_out")) {
     return failure(
         ErrorCode::full,
@@ -38,22 +75,27 @@ Result<const Json*> local_in(const Json& frame, std::string_view name) {
         "on, or delete breakpoints");
   }
   const auto locals = frame.find("locals");
-  if (locals == frame.end()) return nullptr;
+  if (locals == frame.end()) return Json();
+  const auto indexed = IndexedName::parse(name);
+  const std::string_view canonical = indexed ? std::string_view(indexed->canonical) : name;
   const auto found = std::ranges::find_if(
-      *locals, [&](const Json& local) { return same_name(local.value("name", ""), name); });
-  if (found != locals->end()) return &*found;
+      *locals, [&](const Json& local) { return same_without_brackets(local.value("name", ""), canonical); });
+  if (found != locals->end())
+    return indexed ? element_of(*found, *indexed) : std::unexpected(indexed.error());
   for (const Json& local : *locals) {
     const std::string member = local.value("name", "");
-    const bool is_inside = member.size() > name.size() && member[name.size()] == '.';
-    if (!name.empty() && is_inside && same_name(std::string_view(member).substr(0, name.size()), name))
+    const bool is_inside = member.size() > canonical.size() &&
+                           (member[canonical.size()] == '.' || member[canonical.size()] == '[');
+    if (!name.empty() && is_inside &&
+        same_variable_name(std::string_view(member).substr(0, canonical.size()), canonical))
       return std::unexpected(has_members(name, member));
   }
-  return nullptr;
+  return Json();
 }
 
 Error error_in_frame(const Json& frame, Error error) {
   if (error.code != ErrorCode::not_found || frame.empty()) return error;
-  error.message += "; arrays, references and function blocks among local variables are not shown";
+  error.message += "; references and function blocks among local variables are not shown";
   return error;
 }
 

@@ -18,9 +18,12 @@ namespace plchost {
 /// The task of that name in a state of a debugger; null: it has none.
 [[nodiscard]] const nlohmann::json* task_in(const nlohmann::json& state, std::string_view name);
 
-/// The local variable that a name means in a frame: its name, type and value. Null: the frame has none. full:
-/// the state was too long to tell them. invalid_argument: it is a structure.
-[[nodiscard]] Result<const nlohmann::json*> local_in(const nlohmann::json& frame, std::string_view name);
+/// The local variable, or the element of one, that a name means in a frame: its name, type and value. Null:
+/// the frame has none. full: the state was too long to tell it. invalid_argument: it is a structure, or the
+/// array has no such element.
+[[nodiscard]] Result<nlohmann::json> local_in(const nlohmann::json& frame, std::string_view name);
+/// The value of a local variable of a frame, for people; of an array its first elements.
+[[nodiscard]] std::string value_of_local(const nlohmann::json& local);
 
 /// The error of a name that means nothing in a frame. It says which local variables a frame does not show.
 [[nodiscard]] Error error_in_frame(const nlohmann::json& frame, Error error);

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "shm/base/trimmed.hpp"
-#include "shm/variables/variable_symbol.hpp"
 
 namespace plchost {
 
@@ -28,6 +27,7 @@ std::optional<ExpandedArray> ExpandedArray::of(std::string_view name, std::strin
   if (!type.starts_with("ARRAY") || begin > end || end == std::string_view::npos) return std::nullopt;
   ExpandedArray array;
   array.name_ = name;
+  array.element_type_ = type.substr(end + std::string_view("] OF ").size());
   std::string_view rest = type.substr(begin + 1, end - begin - 1);
   while (!rest.empty()) {
     const std::string_view bounds = trimmed(rest.substr(0, rest.find(',')));
@@ -45,6 +45,21 @@ std::optional<ExpandedArray> ExpandedArray::of(std::string_view name, std::strin
   for (std::size_t at = name.find("[]"); at != std::string_view::npos; at = name.find("[]", at + 2)) ++places;
   if (places == 0 || places != array.dimensions_.size()) return std::nullopt;
   return array;
+}
+
+Result<std::uint64_t> ExpandedArray::number(const IndexedName& element) const {
+  std::uint64_t number = 0;
+  for (std::size_t d = 0; d < dimensions_.size(); ++d) {
+    const auto [first, count] = dimensions_[d];
+    const auto index = d < element.indexes.size() ? element.indexes[d] : std::nullopt;
+    if (!index || *index < first || static_cast<std::uint64_t>(*index - first) >= count) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{}: allowed as index {} are {} to {}", name_, d + 1, first,
+                                 first + static_cast<std::int64_t>(count) - 1));
+    }
+    number = number * count + static_cast<std::uint64_t>(*index - first);
+  }
+  return number;
 }
 
 std::string ExpandedArray::element(std::uint64_t number) const {

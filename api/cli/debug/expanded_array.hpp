@@ -6,6 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "shm/base/result.hpp"
+#include "shm/variables/indexed_name.hpp"
+
 namespace plchost {
 
 /// An array whose elements a debugger's client asks for one by one.
@@ -18,6 +21,9 @@ class ExpandedArray {
   [[nodiscard]] std::uint64_t elements() const noexcept { return elements_; }
   /// The whole name of element `number`, row-major, from 0: "Main.t[1]".
   [[nodiscard]] std::string element(std::uint64_t number) const;
+  [[nodiscard]] const std::string& element_type() const noexcept { return element_type_; }
+  /// The number of the element of such a name. invalid_argument: it names none; says what is allowed.
+  [[nodiscard]] Result<std::uint64_t> number(const IndexedName& element) const;
   /// The part of such a name from its first bracket on: "[1]".
   [[nodiscard]] std::string label(std::string_view element) const {
     return std::string(element.substr(name_.find('[')));
@@ -35,6 +41,7 @@ class ExpandedArray {
     bool operator==(const Dimension&) const = default;
   };
   std::string name_;
+  std::string element_type_;
   std::vector<Dimension> dimensions_;
   std::uint64_t elements_ = 1;
 };

@@ -7,6 +7,8 @@
 #include <fmt/ranges.h>
 #include <header_macros.hpp>
 
+#include "shm/variables/variable_symbol.hpp"
+
 namespace plchost::iec {
 
 namespace {
@@ -27,6 +29,27 @@ std::vector<unsigned> ascending(std::vector<unsigned> lines) {
   return lines;
 }
 
+// A row for each that is an array; empty: none is.
+std::string declared_arrays(std::size_t pou, std::span<const DebugLocal> locals) {
+  std::string rows;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < locals.size(); ++i) {
+    if (locals[i].dimensions.empty()) continue;
+    ++count;
+    const auto dimensions = std::views::transform(locals[i].dimensions, [](const DebugLocal::Dimension& one) {
+      return fmt::format("{{{}, {}u, {}}}", one.first, one.count, one.stride);
+    });
+    rows += fmt::format("    {{{}u, {}u, {{{}}}}},\n", i, locals[i].dimensions.size(),
+                        fmt::join(dimensions, ", "));
+  }
+  if (rows.empty()) return "";
+  return fmt::format(
+      "  static const Plc_LocalArray plchost_arrays_{0}[] = {{\n{1}  }};\n"
+      "  plchost_pou_{0}.pArrays = plchost_arrays_{0};\n"
+      "  plchost_pou_{0}.nArrays = {2}u;\n",
+      pou, rows, count);
+}
+
 // Their types are known only behind the program.
 std::string declared_locals(std::size_t pou, std::span<const DebugLocal> locals) {
   if (locals.empty()) return "";
@@ -35,13 +58,27 @@ std::string declared_locals(std::size_t pou, std::span<const DebugLocal> locals)
     text += fmt::format("    {{\"{}\", {}, {}, {}u, {}u}},\n", local.name, local.type, local.bytes,
                         local.first_line, local.last_line);
   }
-  return text + fmt::format(
-                    "  }};\n  plchost_pou_{0}.pLocals = plchost_locals_{0};\n"
-                    "  plchost_pou_{0}.nLocals = {1}u;\n",
-                    pou, locals.size());
+  return text +
+         fmt::format(
+             "  }};\n  plchost_pou_{0}.pLocals = plchost_locals_{0};\n"
+             "  plchost_pou_{0}.nLocals = {1}u;\n",
+             pou, locals.size()) +
+         declared_arrays(pou, locals);
 }
 
 }  // namespace
+
+bool are_allowed(std::span<const DebugLocal::Dimension> dimensions) noexcept {
+  std::uint64_t elements = 1;
+  for (const DebugLocal::Dimension& one : dimensions) {
+    const std::int64_t last = one.first + static_cast<std::int64_t>(one.count) - 1;
+    if (one.count == 0 || one.count > kMaxVariableElements || one.first < INT32_MIN || last > INT32_MAX)
+      return false;
+    elements *= one.count;
+    if (elements > kMaxVariableElements) return false;
+  }
+  return dimensions.size() <= kMaxVariableDimensions;
+}
 
 std::string debug_header(std::span<const DebugPou> pous) {
   std::string text = "/* Written by plcctl build application. */\n#include \"plc_debug.h\"\n";
@@ -51,7 +88,7 @@ std::string debug_header(std::span<const DebugPou> pous) {
     text += fmt::format(
         "static const unsigned int plchost_lines_{0}[] = {{{1}u}};\n"
         "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u, 0, "
-        "0u}};\n",
+        "0u, 0, 0u}};\n",
         i, fmt::join(lines, "u, "), pous[i].name, in_quotes(pous[i].file), lines.size());
   }
   return text;

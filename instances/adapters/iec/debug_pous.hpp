@@ -1,10 +1,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <fmt/format.h>
 
 namespace plchost::iec {
 
@@ -16,7 +19,25 @@ struct DebugLocal {
   std::string address;      ///< in C, where the POU is entered
   unsigned first_line = 0;  ///< of the statements that it is there for; both 0: all
   unsigned last_line = 0;
+  struct Dimension {
+    std::int64_t first = 0;
+    std::uint64_t count = 0;
+    std::string stride;  ///< of its elements, in C, where all types of the program are known
+  };
+  std::vector<Dimension> dimensions = {};  ///< as many as its name has "[]"
 };
+
+/// Gives dimensions their strides, if the elements of the last one have so many bytes, in C.
+template <class Dimension>
+void give_strides(std::span<Dimension> dimensions, std::string_view bytes) {
+  std::uint64_t elements = 1;
+  for (std::size_t d = dimensions.size(); d-- > 0;) {
+    dimensions[d].stride = fmt::format("{}u * {}", elements, bytes);
+    elements *= dimensions[d].count;
+  }
+}
+/// Whether an instance takes them.
+[[nodiscard]] bool are_allowed(std::span<const DebugLocal::Dimension> dimensions) noexcept;
 
 /// A POU of a debug build, as plc_debug.h describes it. Each has the variable plchost_pou_N in C.
 struct DebugPou {

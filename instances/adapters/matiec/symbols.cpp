@@ -159,6 +159,7 @@ class ValueCollector {
 
   void add_array(const iec::Variable& variable, Symbol symbol, Words& words, std::size_t depth) {
     symbol.value += ".table";
+    const std::size_t begun = symbol.dimensions.size();
     if (!words.take("[")) return leave_out(variable, symbol, "its bounds are not understood");
     do {
       const auto first = words.number();
@@ -177,7 +178,38 @@ class ValueCollector {
     if (!words.take("]") || !words.take("OF"))
       return leave_out(variable, symbol, "its type is not understood");
     const std::string element = words.until({":="});
+    if (by_types_)
+      iec::give_strides(std::span(symbol.dimensions).subspan(begun), size_of(element, depth + 1));
     add_type(variable, std::move(symbol), element, depth + 1);
+  }
+
+  // In C; 0u: it is not known. iec2c has no name for an array that is declared as a type.
+  [[nodiscard]] std::string size_of(const std::string& type, std::size_t depth) const {
+    Words words(type);
+    const std::string first = folded(words.take());
+    if (const auto known = elementary(first)) {
+      if (*known == PLC_TYPE_TIMESPEC_TIME_OF_DAY) return "sizeof(TOD)";
+      return *known == PLC_TYPE_TIMESPEC_DATE_AND_TIME ? "sizeof(DT)" : fmt::format("sizeof({})", first);
+    }
+    if (first == "ARRAY" && words.take("[")) {
+      std::uint64_t elements = 1;
+      do {
+        const auto low = words.number();
+        (void)words.take("..");
+        const auto high = words.number();
+        if (!low || !high || *high < *low) return "0u";
+        elements *= static_cast<std::uint64_t>(std::int64_t{*high} - *low + 1);
+      } while (words.take(","));
+      (void)words.take("]");
+      (void)words.take("OF");
+      return fmt::format("{}u * {}", elements, size_of(words.until({":="}), depth + 1));
+    }
+    const iec::DeclaredType* const declared = depth > kMostNested ? nullptr : find_type(first);
+    if (declared == nullptr) return "0u";
+    const std::string definition = declared->definition.substr(declared->definition.find(':') + 1);
+    Words inner(definition);
+    const bool has_name = inner.is("STRUCT") || inner.is("(");
+    return has_name ? fmt::format("sizeof({})", first) : size_of(definition, depth + 1);
   }
 
   void add_structure(const iec::Variable& variable, const Symbol& within, Words& words, std::size_t depth) {
@@ -212,6 +244,7 @@ class ValueCollector {
   }
 
   const iec::Project& project_;
+  bool by_types_ = false;  // strides are those of types, not of a variable
   std::set<std::string> told_;
   Symbols found_;
 };
@@ -347,7 +380,7 @@ class Collector : ValueCollector {
 /// Those of a POU that are no symbols.
 class LocalCollector : ValueCollector {
  public:
-  explicit LocalCollector(const iec::Project& project) : ValueCollector(project) {}
+  explicit LocalCollector(const iec::Project& project) : ValueCollector(project) { by_types_ = true; }
 
   std::vector<iec::DebugLocal> collect(const iec::Pou& pou) {
     const bool is_function = pou.kind == iec::Pou::Kind::function;
@@ -358,12 +391,15 @@ class LocalCollector : ValueCollector {
       add({.name = pou.name, .type = pou.result, .location = "", .place = pou.place}, is_function);
     std::vector<iec::DebugLocal> locals;
     for (const Symbol& symbol : found_.all) {
-      if (!symbol.dimensions.empty() || symbol.name.size() > PLC_MAX_SYMBOL_NAME) continue;
+      if (symbol.name.size() > PLC_MAX_SYMBOL_NAME) continue;
       if (locals.size() == PLC_MAX_POU_LOCALS) break;
-      locals.push_back({.name = symbol.name,
-                        .type = fmt::format("{}u", symbol.type),
-                        .bytes = symbol.type == PLC_TYPE_COUNTED_STRING ? "sizeof(STRING)" : "0",
-                        .address = "&" + symbol.value});
+      iec::DebugLocal local{.name = symbol.name,
+                            .type = fmt::format("{}u", symbol.type),
+                            .bytes = symbol.type == PLC_TYPE_COUNTED_STRING ? "sizeof(STRING)" : "0",
+                            .address = "&" + symbol.value};
+      for (const Symbol::Dimension& one : symbol.dimensions)
+        local.dimensions.push_back({.first = one.first, .count = one.count, .stride = one.stride});
+      if (iec::are_allowed(local.dimensions)) locals.push_back(std::move(local));
     }
     return locals;
   }

@@ -51,7 +51,7 @@ struct Symbols {
                                  const iec::TaskPlan& plan, const ValueOfPlace& value_of_place);
 
 /// Its variables that are no symbols, in its C code: all of a function, and those of the sections VAR_IN_OUT
-/// and VAR_TEMP of others. Arrays are left out. At most PLC_MAX_POU_LOCALS.
+/// and VAR_TEMP of others. At most PLC_MAX_POU_LOCALS.
 [[nodiscard]] std::vector<iec::DebugLocal> locals_of(const iec::Project& project, const iec::Pou& pou);
 
 }  // namespace plchost::matiec

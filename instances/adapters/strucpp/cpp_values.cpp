@@ -23,6 +23,7 @@ constexpr std::string_view kLibrary = "IEC_";
 constexpr std::string_view kPlain = "_t";
 constexpr std::string_view kString = "IECStringVar<";
 constexpr std::string_view kEnumeration = "IEC_ENUM<";
+constexpr std::string_view kArray = "Array";
 /// The library adds the length to the characters, and an end.
 constexpr unsigned kMostCharacters = PLC_MAX_STRING - 16;
 
@@ -56,6 +57,57 @@ bool is_string(std::string_view type) {
   std::from_chars(type.data() + kString.size(), type.data() + type.size(), characters);
   return characters > 0 && characters <= kMostCharacters;
 }
+
+/// "IEC_ENUM<COLOR>" is of "COLOR"; others stay as they are.
+std::string enumeration_in(const std::string& type) {
+  if (!type.starts_with(kEnumeration) || !type.ends_with('>')) return type;
+  return type.substr(kEnumeration.size(), type.size() - kEnumeration.size() - 1);
+}
+
+/// "Array2D<IEC_INT, 0, 1, 2, 4>"
+struct CppArray {
+  std::string element;
+  std::vector<iec::DebugLocal::Dimension> dimensions;
+
+  /// Nothing: the text is something else.
+  static std::optional<CppArray> parse(std::string_view type) {
+    const std::size_t begin = type.find('<');
+    if (!type.starts_with(kArray) || begin == std::string_view::npos || !type.ends_with('>'))
+      return std::nullopt;
+    const std::string_view words = type.substr(begin + 1, type.size() - begin - 2);
+    std::size_t end = 0;
+    for (int depth = 0; end < words.size() && (depth > 0 || words[end] != ','); ++end)
+      depth += words[end] == '<' ? 1 : words[end] == '>' ? -1 : 0;
+    CppArray array{.element = std::string(trimmed(words.substr(0, end))), .dimensions = {}};
+    std::vector<std::int64_t> bounds;
+    for (const auto part : std::views::split(words.substr(std::min(end + 1, words.size())), ',')) {
+      const std::string_view text = trimmed(std::string_view(part.begin(), part.end()));
+      const auto [stop, error] =
+          std::from_chars(text.data(), text.data() + text.size(), bounds.emplace_back());
+      if (error != std::errc() || stop != text.data() + text.size()) return std::nullopt;
+    }
+    if (bounds.empty() || bounds.size() % 2 != 0) return std::nullopt;
+    for (std::size_t i = 0; i < bounds.size(); i += 2) {
+      if (bounds[i] < INT32_MIN || bounds[i + 1] > INT32_MAX || bounds[i + 1] < bounds[i])
+        return std::nullopt;
+      array.dimensions.push_back({.first = bounds[i],
+                                  .count = static_cast<std::uint64_t>(bounds[i + 1] - bounds[i] + 1),
+                                  .stride = ""});
+    }
+    iec::give_strides(std::span(array.dimensions), array.bytes_of_element());
+    return array;
+  }
+
+ private:
+  // In C++. The library keeps elements one behind the other, and nothing else.
+  [[nodiscard]] std::string bytes_of_element() const {
+    if (const auto inner = parse(element))
+      return fmt::format("{}u * {}", inner->dimensions.front().count, inner->dimensions.front().stride);
+    const std::string plain = enumeration_in(element);
+    return plain == element ? fmt::format("sizeof(strucpp::{})", element)
+                            : fmt::format("sizeof(strucpp::{}strucpp::{}>)", kEnumeration, plain);
+  }
+};
 
 }  // namespace
 
@@ -127,35 +179,55 @@ std::string CppValues::name_in_source(const std::string& name) const {
 
 void CppValues::add(std::vector<iec::DebugLocal>& locals, const CppVariable& variable,
                     const std::string& name) const {
-  add(locals, variable.type, name, variable.name, 0);
+  add(locals, {.type = variable.type, .name = name, .value = variable.name}, 0);
 }
 
-void CppValues::add(std::vector<iec::DebugLocal>& locals, const std::string& type, const std::string& name,
-                    const std::string& value, std::size_t depth) const {
-  if (depth > iec::kMostNested || locals.size() == PLC_MAX_POU_LOCALS || name.size() > PLC_MAX_SYMBOL_NAME)
+void CppValues::add(std::vector<iec::DebugLocal>& locals, const Part& part, std::size_t depth) const {
+  const std::string& type = part.type;
+  if (depth > iec::kMostNested || locals.size() == PLC_MAX_POU_LOCALS ||
+      part.name.size() > PLC_MAX_SYMBOL_NAME)
     return;
   const auto found = [&](std::string number, std::string bytes) {
-    locals.push_back({.name = name,
+    locals.push_back({.name = part.name,
                       .type = std::move(number),
                       .bytes = std::move(bytes),
-                      .address = fmt::format("::plchost_local({})", value)});
+                      .address = fmt::format("::plchost_local({})", part.value),
+                      .dimensions = part.dimensions});
   };
   if (const unsigned number = elementary(type); number != 0) return found(fmt::format("{}u", number), "0");
   if (is_string(type))
     return found(fmt::format("{}u", PLC_TYPE_SIZED_STRING), fmt::format("plchost_bytes<strucpp::{}>", type));
-  const std::string plain = type.starts_with(kEnumeration) && type.ends_with('>')
-                                ? type.substr(kEnumeration.size(), type.size() - kEnumeration.size() - 1)
-                                : type;
+  if (type.starts_with(kArray)) return add_array(locals, part, depth);
+  const std::string plain = enumeration_in(type);
   if (enumerations_.contains(plain))
     return found(fmt::format("plchost_enumeration<strucpp::{}>", plain), "0");
-  if (const auto alias = aliases_.find(type); alias != aliases_.end())
-    return add(locals, alias->second, name, value, depth + 1);
+  Part next = part;
+  if (const auto alias = aliases_.find(type); alias != aliases_.end()) {
+    next.type = alias->second;
+    return add(locals, next, depth + 1);
+  }
   const auto fields = members_.find(type);
   if (fields == members_.end() || !structures_.contains(type)) return;
   for (const CppVariable& field : fields->second) {
-    add(locals, field.type, fmt::format("{}.{}", name, name_in_source(field.name)),
-        fmt::format("{}.{}", value, field.name), depth + 1);
+    next.type = field.type;
+    next.name = fmt::format("{}.{}", part.name, name_in_source(field.name));
+    next.value = fmt::format("{}.{}", part.value, field.name);
+    add(locals, next, depth + 1);
   }
+}
+
+void CppValues::add_array(std::vector<iec::DebugLocal>& locals, const Part& array, std::size_t depth) const {
+  const auto type = CppArray::parse(array.type);
+  if (!type) return;
+  Part element{.type = type->element, .name = array.name, .value = "", .dimensions = array.dimensions};
+  std::string first;
+  for (const iec::DebugLocal::Dimension& one : type->dimensions) {
+    element.name += "[]";
+    first += fmt::format(", {}L", one.first);
+    element.dimensions.push_back(one);
+  }
+  element.value = fmt::format("::plchost_at({}{})", array.value, first);
+  if (iec::are_allowed(element.dimensions)) add(locals, element, depth + 1);
 }
 
 }  // namespace plchost::strucpp

@@ -38,8 +38,15 @@ class CppValues {
 
  private:
   void read_line(std::string_view line);
-  void add(std::vector<iec::DebugLocal>& locals, const std::string& type, const std::string& name,
-           const std::string& value, std::size_t depth) const;
+  /// A part of a variable: an element of an array, a field of a structure.
+  struct Part {
+    std::string type;
+    std::string name;
+    std::string value;  ///< in C++
+    std::vector<iec::DebugLocal::Dimension> dimensions = {};
+  };
+  void add(std::vector<iec::DebugLocal>& locals, const Part& part, std::size_t depth) const;
+  void add_array(std::vector<iec::DebugLocal>& locals, const Part& array, std::size_t depth) const;
 
   std::map<std::string, std::string> aliases_;
   std::set<std::string> enumerations_;

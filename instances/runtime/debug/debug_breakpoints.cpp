@@ -43,13 +43,16 @@ ValuePlace DebugService::place_of(VariableElement element) const {
   return {.type = symbol.type, .bytes = symbol.bytes, .address = variables.bytes(element).data()};
 }
 
-std::optional<ValuePlace> DebugService::find_local_value(PouLine place, std::string_view name) const {
+Result<std::optional<ValuePlace>> DebugService::find_local_value(PouLine place, std::string_view name) const {
   const DeclaredPou& pou = program_.pous().pous()[place.pou];
-  const auto number = pou.local(name, place.line);
-  if (!number) return std::nullopt;
-  const DeclaredLocal& local = pou.locals[*number];
-  return ValuePlace{
-      .type = local.type, .bytes = local.bytes, .base = ValuePlace::Base::local, .local = *number};
+  PLCHOST_TRY_ASSIGN(const auto found, pou.local(name, place.line));
+  if (!found) return std::nullopt;
+  const VariableSymbol& symbol = pou.locals[found->local].symbol;
+  return ValuePlace{.type = symbol.type,
+                    .bytes = symbol.bytes,
+                    .base = ValuePlace::Base::local,
+                    .offset = found->offset,
+                    .local = found->local};
 }
 
 Result<std::optional<ValuePlace>> DebugService::find_own_value(std::uint32_t pou,
@@ -88,7 +91,8 @@ Result<Breakpoint> DebugService::resolve(std::uint32_t id, BreakpointOrder order
                         .hits = std::make_shared<std::atomic<std::uint64_t>>(0)};
   PLCHOST_TRY_ASSIGN(breakpoint.place, program_.pous().find(breakpoint.order.place));
   const FindValue find = [&](std::string_view name) -> Result<ValuePlace> {
-    if (const auto local = find_local_value(breakpoint.place, name)) return *local;
+    PLCHOST_TRY_ASSIGN(const auto local, find_local_value(breakpoint.place, name));
+    if (local) return *local;
     PLCHOST_TRY_ASSIGN(const auto own, find_own_value(breakpoint.place.pou, name));
     if (own) return *own;
     PLCHOST_TRY_ASSIGN(const auto element, program_.variables().find(name));

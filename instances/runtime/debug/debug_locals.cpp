@@ -55,17 +55,18 @@ Result<std::string> DebugService::write_local(std::string_view order) {
   PLCHOST_TRY_ASSIGN(const auto parts, LocalOrder::parse(order));
   PLCHOST_TRY_ASSIGN(const auto* const frame, frame_of(parts.task, parts.frame));
   const DeclaredPou& pou = program_.pous().pous()[frame->pPou->dwNumber];
-  const auto number = pou.local(parts.name, *frame);
-  if (!number) {
+  PLCHOST_TRY_ASSIGN(const auto found, pou.local(parts.name, *frame));
+  if (!found) {
     return failure(ErrorCode::not_found, fmt::format("no local variable '{}' at {}:{}", shown(parts.name),
                                                      pou.name, frame->dwLine));
   }
-  const DeclaredLocal& local = pou.locals[*number];
+  const VariableSymbol& symbol = pou.locals[found->local].symbol;
   // Its thread sleeps.
-  auto written =
-      parse_variable(local.type, parts.value, std::span(local_address(*frame, *number), local.bytes));
-  if (!written) return failure_in(fmt::format("local variable '{}'", local.name), std::move(written).error());
-  return nlohmann::json{{"written", local.name}}.dump();
+  auto written = parse_variable(symbol.type, parts.value,
+                                std::span(local_address(*frame, found->local) + found->offset, symbol.bytes));
+  if (!written)
+    return failure_in(fmt::format("local variable '{}'", shown(parts.name)), std::move(written).error());
+  return nlohmann::json{{"written", symbol.name}}.dump();
 }
 
 }  // namespace plchost

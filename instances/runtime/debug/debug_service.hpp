@@ -46,6 +46,14 @@ class DebugService {
   /// Frames that are told of each task, and lines of log points.
   static constexpr std::size_t kMostFrames = 32;
   static constexpr std::size_t kLogKept = 32;
+  /// Elements that are told of each array among local variables; of a state that is too long fewer.
+  static constexpr std::size_t kMostElements = 256;
+  /// How much of a stack is told.
+  struct StackDetail {
+    std::size_t frames = 0;
+    std::size_t with_locals = 0;  ///< the innermost, of those
+    std::size_t elements = 0;     ///< of each array among them
+  };
 
   /// The application that runs, and the names of its tasks; all outlive this object. Not for one that
   /// declares no POU: then nothing else is called.
@@ -106,15 +114,15 @@ class DebugService {
   [[nodiscard]] Result<std::optional<ValuePlace>> find_own_value(std::uint32_t pou,
                                                                  std::string_view name) const;
   /// Nothing: there is no local variable of that name at that statement.
-  [[nodiscard]] std::optional<ValuePlace> find_local_value(PouLine place, std::string_view name) const;
+  [[nodiscard]] Result<std::optional<ValuePlace>> find_local_value(PouLine place,
+                                                                   std::string_view name) const;
   [[nodiscard]] ValuePlace place_of(VariableElement element) const;
   /// "TASK FRAME NAME=VALUE"
   [[nodiscard]] Result<std::string> write_local(std::string_view order);
   /// Of a task that halts; 0: where it halts.
   [[nodiscard]] Result<const Plc_Frame*> frame_of(std::string_view task, std::string_view number) const;
   [[nodiscard]] std::string_view state_text(const DebugTask& task, bool halted) const noexcept;
-  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, std::size_t frames,
-                                             std::size_t with_locals) const;
+  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, StackDetail detail) const;
   [[nodiscard]] std::string remark() const;
   [[nodiscard]] std::string remark_of(const Breakpoint& breakpoint) const;
   void end_session(std::string_view why);

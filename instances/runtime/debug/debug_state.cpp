@@ -1,5 +1,6 @@
 // The state of a debug session as its debugger sees it: DebugService::state().
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -25,17 +26,27 @@ std::string_view reason_text(HaltReason reason) noexcept {
   return "";
 }
 
+Json value_of(const DeclaredLocal& local, const std::byte* address, std::size_t most_elements) {
+  const VariableSymbol& symbol = local.symbol;
+  const auto text_at = [&](std::uint32_t offset) {
+    return variable_text(symbol.type, std::span(address + offset, symbol.bytes));
+  };
+  if (symbol.dimensions.empty())
+    return {{"name", symbol.name}, {"type", traits_of(symbol.type).name}, {"value", text_at(0)}};
+  Json elements = Json::array();
+  for (std::uint32_t i = 0; i < std::min<std::size_t>(symbol.elements(), most_elements); ++i)
+    elements.push_back(text_at(local.offset(i)));
+  return {{"name", symbol.name}, {"type", type_text(symbol)}, {"elements", std::move(elements)}};
+}
+
 // Those of its statement that this call has.
-Json locals_of(const Plc_Frame& frame, const DeclaredPou& pou) {
+Json locals_of(const Plc_Frame& frame, const DeclaredPou& pou, std::size_t most_elements) {
   Json locals = Json::array();
   for (std::uint32_t i = 0; i < pou.locals.size(); ++i) {
     const DeclaredLocal& local = pou.locals[i];
     const std::byte* const address = local_address(frame, i);
     if (address == nullptr || !local.is_at(frame.dwLine)) continue;
-    const std::span bytes(address, local.bytes);
-    locals.push_back({{"name", local.name},
-                      {"type", traits_of(local.type).name},
-                      {"value", variable_text(local.type, bytes)}});
+    locals.push_back(value_of(local, address, most_elements));
   }
   return locals;
 }
@@ -46,14 +57,8 @@ Duration time_of(const DebugTask::Halt& halt) {
   return (MonotonicClock::now() - halt.since) / kStep * kStep;
 }
 
-/// How much of a stack is told.
-struct StackDetail {
-  std::size_t frames = 0;
-  std::size_t with_locals = 0;  ///< the innermost, of those
-};
-
 // The frames are on the stack of a thread that sleeps.
-Json frames_of(const Plc_Frame* frame, const PouCollection& pous, StackDetail detail) {
+Json frames_of(const Plc_Frame* frame, const PouCollection& pous, DebugService::StackDetail detail) {
   Json frames = Json::array();
   for (; frame != nullptr && frames.size() < detail.frames; frame = frame->pCaller) {
     if (frame->pPou == nullptr || frame->pPou->dwNumber >= pous.pous().size()) break;
@@ -62,7 +67,7 @@ Json frames_of(const Plc_Frame* frame, const PouCollection& pous, StackDetail de
     const auto path = pous.path_of(frame->pPou->dwNumber, frame->pSelf);
     if (!path.empty()) one["instance"] = path;
     if (frame->nLocals > 0 && frames.size() < detail.with_locals) {
-      one["locals"] = locals_of(*frame, pou);
+      one["locals"] = locals_of(*frame, pou, detail.elements);
     } else if (frame->nLocals > 0) {
       one["locals_left_out"] = true;
     }
@@ -88,19 +93,25 @@ Json json_of(const Breakpoint& breakpoint, const PouCollection& pous, bool order
 
 /// The parts of a state that is too long otherwise. Halts are told in each.
 struct Detail {
-  StackDetail stack;
+  DebugService::StackDetail stack;
   bool texts;  ///< lines of log points, and what was written behind the places of breakpoints
   bool breakpoints;
   const char* left_out;
 };
+constexpr std::size_t kFrames = DebugService::kMostFrames;
+constexpr std::size_t kFewElements = 16;
 constexpr std::array kDetails{
-    Detail{{DebugService::kMostFrames, DebugService::kMostFrames}, true, true, ""},
-    Detail{{DebugService::kMostFrames, 1}, true, true, "local variables of callers"},
-    Detail{{DebugService::kMostFrames, 0}, true, true, "local variables"},
-    Detail{{4, 0}, true, true, "local variables"},
+    Detail{{kFrames, kFrames, DebugService::kMostElements}, true, true, ""},
+    Detail{{kFrames, kFrames, kFewElements}, true, true, "elements of local arrays"},
     Detail{
-        {4, 0}, false, true, "local variables, conditions and texts of breakpoints, and lines of log points"},
-    Detail{{1, 0}, false, false, "local variables, all breakpoints, and lines of log points"}};
+        {kFrames, 1, kFewElements}, true, true, "local variables of callers, and elements of local arrays"},
+    Detail{{kFrames, 0, 0}, true, true, "local variables"},
+    Detail{{4, 0, 0}, true, true, "local variables"},
+    Detail{{4, 0, 0},
+           false,
+           true,
+           "local variables, conditions and texts of breakpoints, and lines of log points"},
+    Detail{{1, 0, 0}, false, false, "local variables, all breakpoints, and lines of log points"}};
 
 }  // namespace
 
@@ -111,8 +122,7 @@ std::string_view DebugService::state_text(const DebugTask& task, bool halted) co
   return task.ignored() ? "ignored" : "runs";
 }
 
-nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frames,
-                                           std::size_t with_locals) const {
+nlohmann::json DebugService::state_of_task(std::size_t number, StackDetail detail) const {
   const DebugTask& task = *tasks_[number];
   const auto halt = task.halt();  // once: it may halt meanwhile, and a state has its place and stack
   Json one{{"task", name_of(number)}, {"state", state_text(task, halt.has_value())}};
@@ -130,7 +140,7 @@ nlohmann::json DebugService::state_of_task(std::size_t number, std::size_t frame
   one["halt"] = halt->number;
   one["reason"] = reason_text(halt->reason);
   if (halt->breakpoint != 0) one["breakpoint"] = halt->breakpoint;
-  one["stack"] = frames_of(halt->frame, program_.pous(), {.frames = frames, .with_locals = with_locals});
+  one["stack"] = frames_of(halt->frame, program_.pous(), detail);
   return one;
 }
 
@@ -138,8 +148,7 @@ std::string DebugService::state(std::size_t most) const {
   const auto dump = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
   for (const Detail& detail : kDetails) {
     Json tasks = Json::array();
-    for (std::size_t i = 0; i < tasks_.size(); ++i)
-      tasks.push_back(state_of_task(i, detail.stack.frames, detail.stack.with_locals));
+    for (std::size_t i = 0; i < tasks_.size(); ++i) tasks.push_back(state_of_task(i, detail.stack));
     Json breakpoints = Json::array();
     for (const auto& breakpoint : breakpoints_) {
       if (detail.breakpoints) breakpoints.push_back(json_of(*breakpoint, program_.pous(), detail.texts));

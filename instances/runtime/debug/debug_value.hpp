@@ -24,7 +24,7 @@ struct ValuePlace {
   enum class Base : std::uint8_t {
     address,
     self,   ///< so many bytes behind the variables of the POU that the frame is of
-    local,  ///< the frame's local variable of this number
+    local,  ///< so many bytes behind the frame's local variable of this number
   };
   VariableType type{};
   std::uint32_t bytes = 0;
@@ -39,7 +39,7 @@ struct ValuePlace {
                                    : base == Base::local ? local_address(frame, local)
                                                          : static_cast<const std::byte*>(frame.pSelf);
     if (found == nullptr) return {};
-    return {base == Base::self ? found + offset : found, bytes};
+    return {base == Base::address ? found : found + offset, bytes};
   }
 };
 

@@ -1,6 +1,7 @@
 #include "instances/runtime/debug/declared_pou.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -13,7 +14,7 @@
 #include "shm/base/names.hpp"
 #include "shm/base/path_parts.hpp"
 #include "shm/log/log.hpp"
-#include "shm/variables/variable_symbol.hpp"
+#include "shm/variables/indexed_name.hpp"
 
 namespace plchost {
 
@@ -38,7 +39,30 @@ bool is_pou_name(std::string_view name) noexcept {
   return !name.empty() && name.size() <= kMaxPouName && std::ranges::all_of(name, is_word);
 }
 
-Result<DeclaredLocal> declared_local(const Plc_Local& local) {
+// A debug build of before ends there.
+constexpr std::size_t kSizeWithoutArrays = offsetof(Plc_Pou, pArrays);
+
+std::span<const Plc_LocalArray> arrays_of(const Plc_Pou& pou) noexcept {
+  if (pou.dwSize == kSizeWithoutArrays || pou.pArrays == nullptr) return {};
+  return {pou.pArrays, pou.nArrays};
+}
+
+Result<void> give_dimensions(DeclaredLocal& local, const Plc_LocalArray& array) {
+  if (array.nDimensions == 0 || array.nDimensions > PLC_MAX_DIMENSIONS) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("an array has 1 to {} dimensions", PLC_MAX_DIMENSIONS));
+  }
+  std::uint64_t reach = local.symbol.bytes;
+  for (const Plc_Dimension& one : std::span(array.aDimensions).first(array.nDimensions)) {
+    local.symbol.dimensions.push_back({.first = one.nFirst, .count = one.nCount});
+    local.strides.push_back(one.dwStride);
+    reach += std::uint64_t{one.nCount} * one.dwStride;
+  }
+  if (reach <= std::numeric_limits<std::uint32_t>::max()) return {};
+  return failure(ErrorCode::invalid_argument, "an array has less than 4 GiB");
+}
+
+Result<DeclaredLocal> declared_local(const Plc_Local& local, const Plc_LocalArray* array) {
   const auto name = text_at(local.pszName, kMaxVariableName);
   const auto bad = [&](std::string_view what) {
     return failure(ErrorCode::invalid_argument, fmt::format("local variable '{}': {}", shown(name), what));
@@ -48,19 +72,20 @@ Result<DeclaredLocal> declared_local(const Plc_Local& local) {
     return bad(fmt::format("dwType {} is not allowed: 1 to {} is", local.dwType, variable_types().size()));
   if (!is_string(type->type) && local.dwBytes != 0 && local.dwBytes != type->bytes)
     return bad(fmt::format("dwBytes {} is not allowed: 0 or {} is", local.dwBytes, type->bytes));
-  const VariableSymbol symbol{.name = std::string(name),
-                              .type = type->type,
-                              .bytes = is_string(type->type) ? local.dwBytes : type->bytes};
-  if (const auto valid = check_symbol(symbol); !valid) return bad(valid.error().message);
+  DeclaredLocal made{.symbol = {.name = std::string(name),
+                                .type = type->type,
+                                .bytes = is_string(type->type) ? local.dwBytes : type->bytes},
+                     .first_line = local.dwFirstLine,
+                     .last_line = local.dwLastLine};
+  if (array != nullptr) {
+    if (const auto given = give_dimensions(made, *array); !given) return bad(given.error().message);
+  }
+  if (const auto valid = check_symbol(made.symbol); !valid) return bad(valid.error().message);
   if (local.dwFirstLine > local.dwLastLine || (local.dwFirstLine == 0) != (local.dwLastLine == 0)) {
     return bad(fmt::format("the lines {} to {} are not allowed: they ascend, or both are 0",
                            local.dwFirstLine, local.dwLastLine));
   }
-  return DeclaredLocal{.name = symbol.name,
-                       .type = symbol.type,
-                       .bytes = symbol.bytes,
-                       .first_line = local.dwFirstLine,
-                       .last_line = local.dwLastLine};
+  return made;
 }
 
 Result<std::vector<DeclaredLocal>> declared_locals(const Plc_Pou& pou) {
@@ -68,9 +93,18 @@ Result<std::vector<DeclaredLocal>> declared_locals(const Plc_Pou& pou) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("it has 0 to {} local variables", PLC_MAX_POU_LOCALS));
   }
+  std::vector<const Plc_LocalArray*> arrays(pou.nLocals, nullptr);
+  for (const Plc_LocalArray& array : arrays_of(pou)) {
+    if (array.dwLocal >= pou.nLocals || arrays[array.dwLocal] != nullptr) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("pArrays: dwLocal {} is not allowed: below {}, and each once", array.dwLocal,
+                                 pou.nLocals));
+    }
+    arrays[array.dwLocal] = &array;
+  }
   std::vector<DeclaredLocal> locals;
   for (const Plc_Local& one : std::span(pou.pLocals, pou.nLocals)) {
-    PLCHOST_TRY_ASSIGN(auto local, declared_local(one));
+    PLCHOST_TRY_ASSIGN(auto local, declared_local(one, arrays[locals.size()]));
     locals.push_back(std::move(local));
   }
   return locals;
@@ -103,34 +137,57 @@ namespace {
 
 // Lines of a method may lie between others of its block: the narrowest range is that of the method.
 template <class Has>
-std::optional<std::uint32_t> narrowest(std::span<const DeclaredLocal> locals, std::string_view name,
+std::optional<std::uint32_t> narrowest(std::span<const DeclaredLocal> locals, std::string_view canonical,
                                        std::uint32_t line, const Has& has) noexcept {
   std::optional<std::uint32_t> found;
   for (std::uint32_t i = 0; i < locals.size(); ++i) {
-    if (!locals[i].is_at(line) || !has(i) || !same_variable_name(locals[i].name, name)) continue;
+    if (!locals[i].is_at(line) || !has(i) || !same_without_brackets(locals[i].symbol.name, canonical))
+      continue;
     if (!found || locals[i].reach() < locals[*found].reach()) found = i;
   }
   return found;
 }
 
-}  // namespace
-
-std::optional<std::uint32_t> DeclaredPou::local(std::string_view local_name,
-                                                std::uint32_t line) const noexcept {
-  return narrowest(locals, local_name, line, [](std::uint32_t) { return true; });
+template <class Has>
+Result<std::optional<LocalElement>> element(std::span<const DeclaredLocal> locals, std::string_view name,
+                                            std::uint32_t line, const Has& has) {
+  const auto indexed = IndexedName::parse(name);
+  if (!indexed) return std::nullopt;
+  const auto number = narrowest(locals, indexed->canonical, line, has);
+  if (!number) return std::nullopt;
+  const DeclaredLocal& local = locals[*number];
+  if (!same_variable_name(local.symbol.name, indexed->canonical))
+    return std::unexpected(other_dimensions(name, local.symbol));
+  auto place = element_number(local.symbol, *indexed);
+  if (!place) return failure_in(fmt::format("'{}'", shown(name)), std::move(place).error());
+  return LocalElement{.local = *number, .offset = local.offset(*place)};
 }
 
-std::optional<std::uint32_t> DeclaredPou::local(std::string_view local_name,
-                                                const Plc_Frame& frame) const noexcept {
-  return narrowest(locals, local_name, frame.dwLine,
-                   [&](std::uint32_t number) { return local_address(frame, number) != nullptr; });
+}  // namespace
+
+std::uint32_t DeclaredLocal::offset(std::uint32_t element) const noexcept {
+  const auto places = places_of(symbol, element);
+  std::uint32_t bytes = 0;
+  for (std::size_t d = 0; d < strides.size(); ++d) bytes += places.at(d) * strides[d];
+  return bytes;
+}
+
+Result<std::optional<LocalElement>> DeclaredPou::local(std::string_view local_name,
+                                                       std::uint32_t line) const {
+  return element(locals, local_name, line, [](std::uint32_t) { return true; });
+}
+
+Result<std::optional<LocalElement>> DeclaredPou::local(std::string_view local_name,
+                                                       const Plc_Frame& frame) const {
+  return element(locals, local_name, frame.dwLine,
+                 [&](std::uint32_t number) { return local_address(frame, number) != nullptr; });
 }
 
 RTS_RESULT PouCollection::declare(Plc_Pou* pou) {
   if (pou == nullptr) return refuse_pou(ERR_PARAMETER, "", "pPou is null");
-  const auto name = text_at(pou->dwSize == sizeof(Plc_Pou) ? pou->pszName : nullptr, kMaxPouName);
-  if (pou->dwSize != sizeof(Plc_Pou))
-    return refuse_pou(ERR_PARAMETER, "", fmt::format("dwSize is not {}", sizeof(Plc_Pou)));
+  const bool is_known = pou->dwSize == sizeof(Plc_Pou) || pou->dwSize == kSizeWithoutArrays;
+  const auto name = text_at(is_known ? pou->pszName : nullptr, kMaxPouName);
+  if (!is_known) return refuse_pou(ERR_PARAMETER, "", fmt::format("dwSize is not {}", sizeof(Plc_Pou)));
   if (!is_pou_name(name)) {
     return refuse_pou(ERR_PARAMETER, name,
                       fmt::format("a name has 1 to {} letters, digits and _", kMaxPouName));

@@ -13,24 +13,32 @@
 
 #include "instances/plc_debug.h"
 #include "shm/base/result.hpp"
-#include "shm/variables/variable_type.hpp"
+#include "shm/variables/variable_symbol.hpp"
 
 namespace plchost {
 
 /// A variable of each call of a POU: see Plc_Local.
 struct DeclaredLocal {
-  std::string name;
-  VariableType type{};
-  std::uint32_t bytes = 0;
+  VariableSymbol symbol;
+  std::vector<std::uint32_t> strides = {};  ///< of its dimensions, in bytes
   std::uint32_t first_line = 0;
   std::uint32_t last_line = 0;
 
   [[nodiscard]] bool is_at(std::uint32_t line) const noexcept {
     return last_line == 0 || (first_line <= line && line <= last_line);
   }
+  /// Of an element, from the first one on.
+  [[nodiscard]] std::uint32_t offset(std::uint32_t element) const noexcept;
   [[nodiscard]] std::uint32_t reach() const noexcept {
     return last_line == 0 ? std::numeric_limits<std::uint32_t>::max() : last_line - first_line;
   }
+};
+
+/// The value that a name means: a local variable, or an element of one.
+struct LocalElement {
+  std::uint32_t local = 0;   ///< its number
+  std::uint32_t offset = 0;  ///< of the element, in bytes
+  bool operator==(const LocalElement&) const = default;
 };
 
 /// A program, function block or function that a debug build has declared.
@@ -42,12 +50,12 @@ struct DeclaredPou {
 
   /// The first line with a statement that is not before `line`; nothing: there is none.
   [[nodiscard]] std::optional<std::uint32_t> line_from(std::uint32_t line) const noexcept;
-  /// The number of the local variable that a name means at a statement; nothing: none. Several methods may
-  /// have one of that name.
-  [[nodiscard]] std::optional<std::uint32_t> local(std::string_view name, std::uint32_t line) const noexcept;
+  /// The local variable that a name means at a statement; nothing: none. Several methods may have one of that
+  /// name. invalid_argument: it is an array and the name says no element of it, or it is none.
+  [[nodiscard]] Result<std::optional<LocalElement>> local(std::string_view name, std::uint32_t line) const;
   /// The same at the statement of a call, of those that it has.
-  [[nodiscard]] std::optional<std::uint32_t> local(std::string_view name,
-                                                   const Plc_Frame& frame) const noexcept;
+  [[nodiscard]] Result<std::optional<LocalElement>> local(std::string_view name,
+                                                          const Plc_Frame& frame) const;
 };
 
 /// A POU, and a line of it with a statement.

@@ -100,10 +100,12 @@ TEST_F(DebuggingByHand, ShowsAndWritesLocalVariables) {
   EXPECT_GT(n, 3);
   const json frames = task("Main")["stack"];
   ASSERT_EQ(frames.size(), 2U);
-  EXPECT_EQ(frames[0]["locals"],
-            json::array({{{"name", "value"}, {"type", "DINT"}, {"value", std::to_string(n)}},
-                         {{"name", "factor"}, {"type", "INT"}, {"value", "2"}},
-                         {{"name", "word"}, {"type", "STRING"}, {"value", "'double'"}}}));
+  json locals = frames[0]["locals"];
+  EXPECT_EQ(locals.back()["elements"].size(), 256U);
+  locals.erase(3);
+  EXPECT_EQ(locals, json::array({{{"name", "value"}, {"type", "DINT"}, {"value", std::to_string(n)}},
+                                 {{"name", "factor"}, {"type", "INT"}, {"value", "2"}},
+                                 {{"name", "word"}, {"type", "STRING"}, {"value", "'double'"}}}));
   EXPECT_FALSE(frames[1].contains("locals")) << "it has none";
   command("local Main 0 Factor = 5");
   command("local Main 0 word='five'");
@@ -112,6 +114,26 @@ TEST_F(DebuggingByHand, ShowsAndWritesLocalVariables) {
   EXPECT_EQ(stack_after("out"), "Main:26");
   EXPECT_EQ(values_->read("Main.doubled"), std::to_string(5 * n));
   EXPECT_THAT(refused("local Main 0 factor=5"), HasSubstr("no local variable 'factor' at Main:26"));
+}
+
+TEST_F(DebuggingByHand, ShowsAndWritesElementsOfLocalArrays) {
+  attach();
+  EXPECT_THAT(refused("break Twice if cells > 3"), HasSubstr("name an element, as cells[1]"));
+  EXPECT_THAT(refused("break Twice if cells[301] > 3"), HasSubstr("allowed as index 1 are 1 to 300"));
+  command("break Twice if cells[1] > 3 AND cells[2] = 7");
+  ASSERT_TRUE(halts("Main")) << state().dump(2);
+  const std::string n = values_->read("Main.counter.n");
+  const auto array = [&] { return task("Main")["stack"][0]["locals"][3]; };
+  EXPECT_EQ(array()["name"], "cells[]");
+  EXPECT_EQ(array()["type"], "ARRAY [1..300] OF INT");
+  EXPECT_EQ(array()["elements"][0], n);
+  EXPECT_EQ(array()["elements"][1], "7");
+  command("local Main 0 Cells[3]=1000");
+  EXPECT_EQ(array()["elements"][2], "1000");
+  EXPECT_THAT(refused("local Main 0 cells[0]=1"), HasSubstr("1 to 300"));
+  EXPECT_THAT(refused("local Main 0 cells=1"), HasSubstr("name an element"));
+  EXPECT_EQ(stack_after("out"), "Main:26");
+  EXPECT_EQ(values_->read("Main.doubled"), std::to_string(2 * std::stoi(n) + 1000));
 }
 
 TEST_F(DebuggingByHand, RefusesLocalVariablesThatThereAreNot) {
@@ -135,7 +157,7 @@ TEST_F(DebuggingByHand, LeavesLocalVariablesOfCallersOutOfAStateThatIsTooLong) {
   process_->event("edge").post();
   ASSERT_TRUE(halts("Edge"));
   const json now = state();
-  EXPECT_EQ(now.value("left_out", ""), "local variables of callers");
+  EXPECT_EQ(now.value("left_out", ""), "local variables of callers, and elements of local arrays");
   const json frames = task("Edge")["stack"];
   EXPECT_EQ(frames.size(), 32U);
   EXPECT_EQ(frames[0]["locals"].size(), 9U);

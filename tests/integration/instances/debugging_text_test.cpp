@@ -1,7 +1,10 @@
 // A debug build of Structured Text, by way of each compiler that is there.
 #include <cstdlib>
 #include <string>
+#include <vector>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -41,7 +44,9 @@ class DebuggedText : public Debugging, public ::testing::WithParamInterface<std:
   std::string local(std::size_t frame, const std::string& name) {
     const json found = task("Main")["stack"][frame];
     for (const json& one : found.value("locals", json::array())) {
-      if (same_variable_name(one.value("name", ""), name)) return one.value("value", "");
+      if (!same_variable_name(one.value("name", ""), name)) continue;
+      if (!one.contains("elements")) return one.value("value", "");
+      return fmt::format("[{}]", fmt::join(one["elements"].get<std::vector<std::string>>(), ", "));
     }
     return "none";
   }
@@ -267,6 +272,93 @@ TEST_P(DebuggedText, HasLocalVariablesInEachCall) {
   command("local Main 0 twice=100");
   EXPECT_EQ(stack_after("out"), "Press:34");
   EXPECT_EQ(values_->read("press1.total"), "110") << "10 + 100";
+}
+
+constexpr const char* kRows = R"(TYPE
+  Row : ARRAY [1..3] OF INT;
+  Site : STRUCT x : INT; far : BOOL; END_STRUCT;
+  Spots : ARRAY [1..2] OF Site;
+  Gear : (idle, busy);
+  Gears : ARRAY [0..1] OF Gear;
+  Grid : ARRAY [0..1, 2..4] OF DINT;
+  Texts : ARRAY [1..2] OF STRING;
+  Clocks : ARRAY [1..2] OF TIME_OF_DAY;
+END_TYPE
+
+FUNCTION Total : INT
+  VAR_INPUT given : INT; END_VAR
+  VAR
+    i : INT; twice : Row; spot : Spots; shift : Gears; cells : Grid; words : Texts; dawn : Clocks;
+  END_VAR
+  FOR i := 1 TO 3 DO
+    twice[i] := given * i;
+  END_FOR;
+  spot[2].x := 21;
+  spot[2].far := TRUE;
+  shift[1] := busy;
+  cells[1, 3] := 13;
+  words[2] := 'two';
+  dawn[2] := TOD#1:02:03;
+  Total := twice[1] + twice[2] + twice[3];
+END_FUNCTION
+
+FUNCTION_BLOCK Mover
+  VAR_IN_OUT io : Row; END_VAR
+  VAR n : INT; END_VAR
+  n := n + 1;
+  io[3] := n;
+END_FUNCTION_BLOCK
+
+PROGRAM Press
+  VAR one : Mover; line : Row; sum : INT; END_VAR
+  line[1] := 4;
+  line[2] := 5;
+  one(io := line);
+  sum := Total(given := line[3]);
+  sum := sum + 0;
+END_PROGRAM
+
+CONFIGURATION cell
+  RESOURCE res ON PLC
+    TASK Main (INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM press1 WITH Main : Press;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+TEST_P(DebuggedText, HasArraysAmongLocalVariables) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kRows));
+  EXPECT_EQ(command("break Total:26 if twice[2] > 5 AND given > 2").value("remark", "x"), "");
+  ASSERT_TRUE(comes_to("Total:26 Press:41")) << state().dump(2);
+  const int given = std::stoi(local(0, "given"));
+  EXPECT_GT(given, 2);
+  EXPECT_EQ(local(0, "twice[]"), fmt::format("[{}, {}, {}]", given, 2 * given, 3 * given));
+  EXPECT_EQ(local(0, "spot[].x"), "[0, 21]");
+  EXPECT_EQ(local(0, "spot[].far"), "[FALSE, TRUE]");
+  EXPECT_EQ(local(0, "shift[]"), "[0, 1]");
+  EXPECT_EQ(local(0, "cells[][]"), "[0, 0, 0, 0, 13, 0]");
+  EXPECT_EQ(local(0, "words[]"), "['', 'two']");
+  EXPECT_EQ(local(0, "dawn[]"), "[TOD#00:00:00, TOD#01:02:03]");
+  EXPECT_THAT(refused("local Main 0 twice[4]=1"), ::testing::HasSubstr("1 to 3"));
+  command("local Main 0 twice[3]=1000");
+  command("local Main 0 spot[1].x=7");
+  EXPECT_EQ(local(0, "spot[].x"), "[7, 21]");
+  EXPECT_EQ(stack_after("out"), "Press:42");
+  EXPECT_EQ(values_->read("press1.sum"), std::to_string(3 * given + 1000));
+}
+
+TEST_P(DebuggedText, HasArraysThatItsBlocksAreGiven) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kRows));
+  EXPECT_EQ(command("break Mover:32 if io[2] = 5").value("remark", "x"), "");
+  ASSERT_TRUE(comes_to("Mover:32 Press:40")) << state().dump(2);
+  if (GetParam() == "matiec") {
+    EXPECT_EQ(local(0, "io[]").substr(0, 5), "[4, 5");
+    command("local Main 0 io[2]=50");
+  } else {
+    write("press1.one.io[2]=50");  // with STruC++ it is a variable that has a whole name
+  }
+  EXPECT_EQ(stack_after("out"), "Press:41");
+  EXPECT_EQ(values_->read("press1.line[2]"), "50");
 }
 
 constexpr const char* kLine = R"(FUNCTION_BLOCK Pump

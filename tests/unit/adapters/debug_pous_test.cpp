@@ -16,7 +16,7 @@ TEST(DebugPous, AreDeclaredWithTheirInstances) {
   const std::vector<DebugInstance> instances{{.pou = 1, .value = "x.UP", .path = "Main0.up"}};
   EXPECT_THAT(debug_header(pous),
               HasSubstr("plchost_lines_0[] = {2u, 3u};\nstatic Plc_Pou plchost_pou_0 = "
-                        "{sizeof(Plc_Pou), \"Main\", \"a.st\", plchost_lines_0, 2u, 0u, 0, 0u};"));
+                        "{sizeof(Plc_Pou), \"Main\", \"a.st\", plchost_lines_0, 2u, 0u, 0, 0u, 0, 0u};"));
   const std::string text = debug_declarations(pous, instances);
   EXPECT_THAT(text, HasSubstr("plc_debug_declare_pou(&plchost_pou_1) == 0;\n"));
   EXPECT_THAT(text, HasSubstr("plc_debug_declare_instance(&plchost_pou_1, &x.UP, \"Main0.up\") == 0;\n"));
@@ -45,6 +45,23 @@ TEST(DebugPous, AreDeclaredWithTheirLocalVariables) {
   EXPECT_THAT(text, HasSubstr("  plchost_pou_1.pLocals = plchost_locals_1;\n  plchost_pou_1.nLocals = 2u;\n"
                               "  good = good && plc_debug_declare_pou(&plchost_pou_1) == 0;\n"));
   EXPECT_THAT(text, testing::Not(HasSubstr("plchost_locals_0")));
+  EXPECT_THAT(text, testing::Not(HasSubstr("plchost_arrays_")));
+}
+
+TEST(DebugPous, AreDeclaredWithTheDimensionsOfTheirLocalArrays) {
+  DebugLocal grid{
+      .name = "grid[][]",
+      .type = "4u",
+      .bytes = "0",
+      .address = "&GRID.table[0][0]",
+      .dimensions = {{.first = -1, .count = 2, .stride = ""}, {.first = 0, .count = 3, .stride = ""}}};
+  give_strides(std::span(grid.dimensions), "sizeof(DINT)");
+  const std::vector<DebugPou> pous{
+      {"Add", "a.st", {9}, {{.name = "x", .type = "3u", .bytes = "0", .address = "&X"}, grid}}};
+  EXPECT_THAT(debug_declarations(pous, {}),
+              HasSubstr("  static const Plc_LocalArray plchost_arrays_0[] = {\n"
+                        "    {1u, 2u, {{-1, 2u, 3u * sizeof(DINT)}, {0, 3u, 1u * sizeof(DINT)}}},\n  };\n"
+                        "  plchost_pou_0.pArrays = plchost_arrays_0;\n  plchost_pou_0.nArrays = 1u;\n"));
 }
 
 // A program may have them as names of its own.

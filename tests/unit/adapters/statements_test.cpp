@@ -72,7 +72,7 @@ TEST(MatiecStatements, GetTheirMacros) {
   EXPECT_THAT(made.text, Not(HasSubstr("#line")));
   const std::string header = iec::debug_header(made.pous);
   EXPECT_THAT(header, HasSubstr("plchost_lines_1[] = {2u, 3u};"));
-  EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u, 0, 0u};"));
+  EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u, 0, 0u, 0, 0u};"));
 }
 
 constexpr const char* kLocals = R"(// FUNCTION
@@ -140,14 +140,18 @@ TEST(MatiecLocals, AreThoseOfTheCThatAreNoSymbols) {
   ASSERT_EQ(made.pous.size(), 2U);
   const auto shown = [](const iec::DebugPou& pou) {
     std::vector<std::string> all;
-    for (const iec::DebugLocal& one : pou.locals)
+    for (const iec::DebugLocal& one : pou.locals) {
       all.push_back(one.name + " " + one.type + " " + one.bytes + " " + one.address);
+      for (const auto& [first, count, stride] : one.dimensions)
+        all.back() += fmt::format(" {}+{} {}", first, count, stride);
+    }
     return all;
   };
   EXPECT_THAT(shown(made.pous[0]),
               ElementsAre("x 3u 0 &X", "calls 3u 0 &CALLS", "m 4u 0 &M", "small 3u 0 &SMALL",
                           "place.X 14u 0 &PLACE.X", "place.Y 14u 0 &PLACE.Y", "place.MODE 4u 0 &PLACE.MODE",
-                          "late 21u 0 &LATE", "s 25u sizeof(STRING) &S", "k 10u 0 &K", "Sum 3u 0 &SUM"));
+                          "cells[] 3u 0 &CELLS.table[0] 1+3 1u * sizeof(INT)", "late 21u 0 &LATE",
+                          "s 25u sizeof(STRING) &S", "k 10u 0 &K", "Sum 3u 0 &SUM"));
   EXPECT_THAT(shown(made.pous[1]),
               ElementsAre("io.X 14u 0 &data__->IO.value.X", "io.Y 14u 0 &data__->IO.value.Y",
                           "io.MODE 4u 0 &data__->IO.value.MODE", "tmp 11u 0 &data__->TMP.value"));

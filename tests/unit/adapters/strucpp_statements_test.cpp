@@ -219,6 +219,8 @@ std::vector<std::string> shown(const std::vector<iec::DebugLocal>& locals) {
   for (const iec::DebugLocal& one : locals) {
     all.push_back(fmt::format("{} {} {} {} {}-{}", one.name, one.type, one.bytes, one.address, one.first_line,
                               one.last_line));
+    for (const auto& [first, count, stride] : one.dimensions)
+      all.back() += fmt::format(" {}+{} {}", first, count, stride);
   }
   return all;
 }
@@ -252,6 +254,10 @@ IEC_INT COUNTER::get_SIZE() const {
     IEC_COLOR C = COLOR::RED;
     PNT PP;
     ARR A;
+    Array2D<PNT, 0, 1, 2, 4> P2;
+    Array1D<Array1D<IECStringVar<10>, 0, 4>, -1, 1> AA;
+    Array1D<IEC_ENUM<COLOR>, 1, 2> CC;
+    Array1D<IEC_INT, 1, 99999999> HUGE;
     SMALL SMALL_ = 3;
     IECStringVar<10> S = "(=";
     IECStringVar<9000> LONG;
@@ -271,14 +277,27 @@ IEC_INT COUNTER::get_SIZE() const {
       shown(made.pous[0].locals),
       ElementsAre("Tmp 11u 0 ::plchost_local(TMP_) 9-11", "TO 3u 0 ::plchost_local(TO) 5-5",
                   "BY 15u 0 ::plchost_local(BY) 5-5", "RESET 3u 0 ::plchost_local(RESET_result) 5-5"));
-  EXPECT_THAT(shown(made.pous[1].locals),
-              ElementsAre("TEXT 26u plchost_bytes<strucpp::IEC_STRING> ::plchost_local(TEXT) 0-0",
-                          "T 16u 0 ::plchost_local(T) 0-0", "Twice 3u 0 ::plchost_local(TWICE_result) 0-0",
-                          "C plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(C) 0-0",
-                          "PP.xx 3u 0 ::plchost_local(PP.XX) 0-0",
-                          "PP.Ink plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(PP.INK) 0-0",
-                          "small 3u 0 ::plchost_local(SMALL_) 0-0",
-                          "S 26u plchost_bytes<strucpp::IECStringVar<10>> ::plchost_local(S) 0-0"));
+  EXPECT_THAT(
+      shown(made.pous[1].locals),
+      ElementsAre("TEXT 26u plchost_bytes<strucpp::IEC_STRING> ::plchost_local(TEXT) 0-0",
+                  "X[] 3u 0 ::plchost_local(::plchost_at(X, 1L)) 0-0 1+3 1u * sizeof(strucpp::IEC_INT)",
+                  "T 16u 0 ::plchost_local(T) 0-0", "Twice 3u 0 ::plchost_local(TWICE_result) 0-0",
+                  "C plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(C) 0-0",
+                  "PP.xx 3u 0 ::plchost_local(PP.XX) 0-0",
+                  "PP.Ink plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(PP.INK) 0-0",
+                  "A[] 3u 0 ::plchost_local(::plchost_at(A, 1L)) 0-0 1+3 1u * sizeof(strucpp::IEC_INT)",
+                  "P2[][].xx 3u 0 ::plchost_local(::plchost_at(P2, 0L, 2L).XX) 0-0 0+2 3u * "
+                  "sizeof(strucpp::PNT) 2+3 1u * sizeof(strucpp::PNT)",
+                  "P2[][].Ink plchost_enumeration<strucpp::COLOR> 0 "
+                  "::plchost_local(::plchost_at(P2, 0L, 2L).INK) 0-0 0+2 3u * sizeof(strucpp::PNT) 2+3 "
+                  "1u * sizeof(strucpp::PNT)",
+                  "AA[][] 26u plchost_bytes<strucpp::IECStringVar<10>> "
+                  "::plchost_local(::plchost_at(::plchost_at(AA, -1L), 0L)) 0-0 -1+3 1u * 5u * 1u * "
+                  "sizeof(strucpp::IECStringVar<10>) 0+5 1u * sizeof(strucpp::IECStringVar<10>)",
+                  "CC[] plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(::plchost_at(CC, 1L)) 0-0 "
+                  "1+2 1u * sizeof(strucpp::IEC_ENUM<strucpp::COLOR>)",
+                  "small 3u 0 ::plchost_local(SMALL_) 0-0",
+                  "S 26u plchost_bytes<strucpp::IECStringVar<10>> ::plchost_local(S) 0-0"));
   EXPECT_THAT(made.texts[0],
               HasSubstr("RESET_result;\n  void* const plchost_locals_[] = {::plchost_local(TO), "
                         "::plchost_local(BY), ::plchost_local(RESET_result)};\n"

@@ -1,159 +1,19 @@
 // The answers to a client of the Debug Adapter Protocol.
-#include "api/cli/debug/dap_session.hpp"
-
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "shm/base/names.hpp"
-#include "tests/unit/api/debugged_instance.hpp"
+#include "tests/unit/api/dap_client.hpp"
 
 namespace plchost {
 namespace {
 
-using nlohmann::json;
-using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-constexpr int kInnermost = 1000;  // frames of the first thread
-constexpr int kCaller = 1002;
-
-class DapSessionTest : public testing::Test {
- protected:
-  DapSessionTest() {
-    instance_.variables = {variable_record("Main.n", "INT", "1"), variable_record("Main.c.n", "INT", "2"),
-                           variable_record("Main.c.text", "STRING", "'on'"),
-                           variable_record("Main.c.t[]", "ARRAY [1..2] OF INT", "[3, 4]")};
-    instance_.halt("fast", 1,
-                   json::array({{{"pou", "Counter"}, {"line", 9}, {"file", "a.st"}, {"instance", "Main.c"}},
-                                {{"pou", "Twice"},
-                                 {"line", 3},
-                                 {"file", "a.st"},
-                                 {"locals", json::array({{{"name", "n"}, {"type", "INT"}, {"value", "3"}}})}},
-                                {{"pou", "Main"}, {"line", 20}, {"file", "a.st"}, {"instance", "Main"}}}));
-    (void)ask("attach");
-  }
-
-  json answer(const std::string& command, const json& arguments = json::object()) {
-    sent_.clear();
-    EXPECT_TRUE(sut_.obey({{"seq", 1}, {"command", command}, {"arguments", arguments}}));
-    for (const json& message : sent_) {
-      if (message["type"] == "response") return message;
-    }
-    return {};
-  }
-  json ask(const std::string& command, const json& arguments = json::object()) {
-    const json response = answer(command, arguments);
-    EXPECT_TRUE(response["success"]) << response;
-    return response["body"];
-  }
-  // "NAME=VALUE" of each.
-  std::vector<std::string> shown(int reference) {
-    std::vector<std::string> all;
-    const json body = ask("variables", {{"variablesReference", reference}});
-    for (const json& one : body["variables"])
-      all.push_back(fmt::format("{}={}", one["name"].get<std::string>(), one["value"].get<std::string>()));
-    return all;
-  }
-  std::string result(const std::string& expression, const std::string& context) {
-    return ask("evaluate",
-               {{"expression", expression}, {"frameId", kInnermost}, {"context", context}})["result"];
-  }
-
-  DebuggedInstance instance_;
-  DebugLink link_{instance_.requests(), "cell", "line1"};
-  std::vector<json> sent_;
-  DapSession sut_{link_, [this](const json& message) { sent_.push_back(message); }, false};
-};
-
-class DapForces : public DapSessionTest {
- protected:
-  DapForces() { instance_.force_all(); }
-};
-
-TEST_F(DapForces, AreShownBesideTheValue) {
-  EXPECT_THAT(shown(kInnermost),
-              ElementsAre("n=2 (forced)", "text='on' (forced)", "t[]=[3, 4] (elements forced)"));
-  for (const char* const context : {"hover", "watch", "repl"})
-    EXPECT_EQ(result("n", context), "2 (forced)") << context;
-}
-
-TEST_F(DapForces, AreNoPartOfACopiedValue) {
-  EXPECT_TRUE(ask("initialize")["supportsClipboardContext"]);
-  EXPECT_EQ(result("n", "clipboard"), "2");
-}
-
-// An editor offers the text that it shows.
-TEST_F(DapForces, AreNoPartOfAValueThatIsSet) {
-  const auto set = [&](const char* value) {
-    return ask("setVariable", {{"variablesReference", kInnermost}, {"name", "n"}, {"value", value}});
-  };
-  EXPECT_EQ(set("3 (forced)")["value"], "2 (forced)") << "as it is now";
-  (void)set("4");
-  EXPECT_THAT(instance_.written, ElementsAre("Main.c.n=3", "Main.c.n=4"));
-}
-
-TEST_F(DapSessionTest, GivesPlainValuesOfVariablesThatAreNotForced) {
-  EXPECT_THAT(shown(kInnermost), ElementsAre("n=2", "text='on'", "t[]=[3, 4]"));
-  EXPECT_EQ(result("n", "hover"), "2");
-}
-
-TEST_F(DapSessionTest, FindsAnArrayByTheNameThatItShows) {
-  const json body = ask("variables", {{"variablesReference", kInnermost}});
-  EXPECT_EQ(result(body["variables"][2]["evaluateName"], "watch"), "[3, 4]");
-  EXPECT_EQ(result("t[]", "watch"), "[3, 4]");
-}
-
-TEST_F(DapSessionTest, ExpandsAnArrayAndSetsItsElements) {
-  instance_.elements = {variable_record("Main.c.t[1]", "INT", "3"),
-                        variable_record("Main.c.t[2]", "INT", "4")};
-  const json array = ask("variables", {{"variablesReference", kInnermost}})["variables"][2];
-  EXPECT_EQ(array["indexedVariables"], 2);
-  const int reference = array["variablesReference"];
-  EXPECT_THAT(shown(reference), ElementsAre("[1]=3", "[2]=4"));
-  const json last =
-      ask("variables", {{"variablesReference", reference}, {"start", 1}, {"count", 9}})["variables"];
-  ASSERT_EQ(last.size(), 1U);
-  EXPECT_EQ(last[0]["name"], "[2]");
-  EXPECT_EQ(last[0]["evaluateName"], "Main.c.t[2]");
-  (void)ask("setVariable", {{"variablesReference", reference}, {"name", "[2]"}, {"value", "9"}});
-  EXPECT_THAT(instance_.written, ElementsAre("Main.c.t[2]=9"));
-  EXPECT_EQ(ask("evaluate", {{"expression", "t"}, {"frameId", kInnermost}})["variablesReference"], reference);
-  EXPECT_FALSE(answer("variables", {{"variablesReference", reference + 1}})["success"]);
-}
-
-TEST_F(DapSessionTest, AFrameHasTheGlobalsOfTheApplication) {
-  instance_.variables.push_back(variable_record("limit", "INT", "7"));
-  instance_.variables.push_back(variable_record("line.total", "DINT", "8"));
-  const json scope = ask("scopes", {{"frameId", kCaller}})["scopes"].back();
-  EXPECT_EQ(scope["name"], "Globals");
-  EXPECT_EQ(scope["expensive"], true);
-  const int reference = scope["variablesReference"];
-  EXPECT_THAT(shown(reference), ElementsAre("limit=7")) << "without programs: those without a dot";
-  instance_.variables.push_back(variable_record("MAIN", "STRING[5]", "'Press'"));
-  dds::copy_text(instance_.variables.back().area, "program");
-  EXPECT_THAT(shown(reference), ElementsAre("limit=7", "line.total=8"));
-  (void)ask("setVariable", {{"variablesReference", reference}, {"name", "line.total"}, {"value", "9"}});
-  EXPECT_THAT(instance_.written, ElementsAre("line.total=9"));
-}
-
-TEST_F(DapSessionTest, EachFrameHasTheValuesOfItsOwnInstance) {
-  const json frames = ask("stackTrace", {{"threadId", 1}})["stackFrames"];
-  ASSERT_EQ(frames.size(), 3U);
-  EXPECT_EQ(frames[2]["id"], kCaller);
-  EXPECT_EQ(ask("scopes", {{"frameId", kInnermost}})["scopes"][0]["name"], "Main.c");
-  const json scope = ask("scopes", {{"frameId", kCaller}})["scopes"][0];
-  EXPECT_EQ(scope["name"], "Main");
-  EXPECT_THAT(shown(scope["variablesReference"]), Contains("n=1"));
-  EXPECT_EQ(ask("evaluate", {{"expression", "n"}, {"frameId", kCaller}})["result"], "1");
-  (void)ask("setVariable", {{"variablesReference", kCaller}, {"name", "n"}, {"value", "5"}});
-  EXPECT_THAT(instance_.written, ElementsAre("Main.n=5"));
-}
 
 TEST_F(DapSessionTest, TellsTheFramesThatItsClientAsksFor) {
   const auto frames = [&](int first, int levels) {
@@ -170,44 +30,6 @@ TEST_F(DapSessionTest, TellsTheFramesThatItsClientAsksFor) {
   EXPECT_THAT(frames(2, 20), ElementsAre(kCaller));
   EXPECT_THAT(frames(3, 20), IsEmpty());
   EXPECT_THAT(frames(-1, -1), ElementsAre(kInnermost, kInnermost + 1, kCaller));
-}
-
-TEST_F(DapSessionTest, TellsWhyAnOwnVariableIsNotRead) {
-  instance_.no_variable = ErrorCode::invalid_argument;  // as of an index out of its range
-  const json response = answer("evaluate", {{"expression", "t[9]"}, {"frameId", kInnermost}});
-  EXPECT_FALSE(response["success"]);
-  EXPECT_EQ(response.value("message", ""), "no variable 'Main.c.t[9]'") << "and not that of a global";
-}
-
-TEST_F(DapSessionTest, AFrameOfAFunctionHasItsLocalVariables) {
-  constexpr int kFunction = kInnermost + 1;
-  const json scopes = ask("scopes", {{"frameId", kFunction}})["scopes"];
-  ASSERT_EQ(scopes.size(), 2U) << "those and the globals";
-  EXPECT_EQ(scopes[0]["name"], "Locals");
-  const int reference = scopes[0]["variablesReference"];
-  EXPECT_THAT(shown(reference), ElementsAre("n=3"));
-  EXPECT_EQ(ask("evaluate", {{"expression", "N"}, {"frameId", kFunction}})["result"], "3");
-  EXPECT_EQ(ask("evaluate", {{"expression", "Main.n"}, {"frameId", kFunction}})["result"], "1");
-  EXPECT_EQ(ask("setVariable", {{"variablesReference", reference}, {"name", "n"}, {"value", "4"}})["value"],
-            "3");
-  (void)ask("evaluate", {{"expression", "n := 5"}, {"frameId", kFunction}, {"context", "repl"}});
-  EXPECT_THAT(instance_.commands, ElementsAre("local fast 1 n=4", "local fast 1 n=5"));
-  EXPECT_THAT(instance_.written, IsEmpty());
-  EXPECT_FALSE(
-      answer("setVariable", {{"variablesReference", 9999}, {"name", "n"}, {"value", "4"}})["success"]);
-}
-
-TEST_F(DapSessionTest, LocalVariablesThatAreNotToldMeanNoOthers) {
-  instance_.tasks[0]["stack"][0]["locals_left_out"] = true;
-  (void)ask("stackTrace", {{"threadId", 1}});
-  const json scopes = ask("scopes", {{"frameId", kInnermost}})["scopes"];
-  ASSERT_EQ(scopes.size(), 3U);
-  const auto fails = [&](const std::string& command, const json& arguments) {
-    return !answer(command, arguments)["success"].get<bool>();
-  };
-  EXPECT_TRUE(fails("variables", {{"variablesReference", scopes[0]["variablesReference"]}}));
-  EXPECT_TRUE(fails("evaluate", {{"expression", "n"}, {"frameId", kInnermost}}));
-  EXPECT_THAT(shown(scopes[1]["variablesReference"]), Contains("n=2"));
 }
 
 TEST_F(DapSessionTest, ShowsASourceByThePathThatItsClientHasForIt) {

@@ -108,6 +108,22 @@ TEST_F(DebugConsoleFrames, OfAFunctionHaveLocalVariables) {
   EXPECT_THAT(instance_.written, ElementsAre("n=5"));
 }
 
+TEST_F(DebugConsoleFrames, HaveElementsOfLocalArrays) {
+  instance_.tasks[0]["stack"][1]["locals"].push_back(
+      {{"name", "grid[][]"}, {"type", "ARRAY [0..1, 1..2] OF INT"}, {"elements", {"1", "2", "3"}}});
+  (void)said("frame 1");
+  EXPECT_EQ(said("print"), "x = 3\nTwice = 0\ngrid[][] = [1, 2, 3, ...]\n");
+  EXPECT_EQ(said("print GRID"), "grid[][] = [1, 2, 3, ...]\n");
+  EXPECT_EQ(said("print grid[1, 1]"), "grid[1,1] = 3\n");
+  EXPECT_EQ(said("set Grid[0][2]=7"), "grid[0,2] = 2\n") << "as it is told";
+  EXPECT_THAT(instance_.commands, ElementsAre("local fast 1 Grid[0][2]=7"));
+  EXPECT_THAT(said("print grid[2,1]"), HasSubstr("allowed as index 1 are 0 to 1"));
+  EXPECT_THAT(said("print grid[1]"), HasSubstr("allowed as index 2 are 1 to 2"));
+  EXPECT_EQ(said("set grid[1,2]=7"), "grid[1,2] = (only the first 3 elements are told)\n");
+  EXPECT_EQ(instance_.commands.back(), "local fast 1 grid[1,2]=7");
+  EXPECT_THAT(said("print x[1]"), HasSubstr("x is no array: it is INT"));
+}
+
 TEST_F(DebugConsoleFrames, WhoseLocalVariablesAreNotToldMeanNoOthers) {
   (void)said("frame 2");
   EXPECT_THAT(said("print"), HasSubstr("the local variables of this call are too long to be told"));
@@ -122,7 +138,7 @@ TEST_F(DebugConsoleFrames, HaveStructuresWithoutAValue) {
   instance_.variables.push_back(variable_record("Main.c.pt.y", "INT", "2"));
   EXPECT_THAT(said("print pt"), HasSubstr("'pt' has members; name one, as Main.c.pt.x"));
   EXPECT_THAT(said("print Main.c.pt"), HasSubstr("'Main.c.pt' has members; name one, as Main.c.pt.x"));
-  EXPECT_THAT(said("print none"), HasSubstr("no variable 'none' in 'Main.c'; arrays, references and function "
+  EXPECT_THAT(said("print none"), HasSubstr("no variable 'none' in 'Main.c'; references and function "
                                             "blocks among local variables are not shown"));
   instance_.tasks[0]["stack"][1]["locals"].push_back({{"name", "at.y"}, {"type", "INT"}, {"value", "4"}});
   (void)said("up");

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <functional>
 #include <iterator>
 #include <string>
 #include <string_view>
@@ -28,7 +30,10 @@ inline plc_VariableRecord variable_record(std::string_view name, std::string_vie
 struct DebuggedInstance {
   nlohmann::json tasks = nlohmann::json::array();  ///< of its state
   std::vector<plc_VariableRecord> variables;
-  std::vector<plc_VariableRecord> elements;      ///< of arrays among them, by their whole names
+  std::vector<plc_VariableRecord> elements;  ///< of arrays among them, by their whole names
+  /// Of each name with an index, if it is there.
+  std::function<plc_VariableRecord(const std::string& name)> make_element;
+  std::size_t asked_patterns = 0;                ///< in requests for variables
   std::vector<std::string> commands;             ///< that came, without the number of the session
   std::vector<std::string> written;              ///< NAME=VALUE
   bool busy = false;                             ///< it refuses commands
@@ -84,7 +89,12 @@ struct DebuggedInstance {
   Result<VariableListing> list(const VariableQuery& query) {
     VariableListing page;
     if (query.patterns.empty()) page.variables.assign(variables.begin(), variables.end());
+    asked_patterns += query.patterns.size();
     for (const std::string& pattern : query.patterns) {
+      if (make_element && pattern.ends_with(']')) {
+        page.variables.push_back(make_element(pattern));
+        continue;
+      }
       PLCHOST_TRY_ASSIGN(const auto found, like(pattern));
       std::ranges::copy(found.variables, std::back_inserter(page.variables));
     }

@@ -251,7 +251,7 @@ class StepRules : public testing::Test {
   }
   char marker_ = 0;
   char another_marker_ = 0;
-  Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0, nullptr, 0};
+  Plc_Pou pou_{sizeof(Plc_Pou), "Main", "main.st", nullptr, 0, 0, nullptr, 0, nullptr, 0};
   Plc_Frame outer_{&pou_, nullptr, 0, 0, nullptr, nullptr, 0, 0};
   Plc_Frame begin_{&pou_, nullptr, 0, 1, nullptr, nullptr, 0, 0};
   Plc_Frame inner_{&pou_, nullptr, 0, 2, nullptr, nullptr, 0, 0};

@@ -19,13 +19,17 @@ using testing::HasSubstr;
 class DeclaredPous : public testing::Test {
  protected:
   RTS_RESULT declare(const char* name, const char* file, std::vector<unsigned> lines,
-                     const std::vector<Plc_Local>& locals = {}) {
+                     const std::vector<Plc_Local>& locals = {},
+                     const std::vector<Plc_LocalArray>& arrays = {}) {
     lines_.push_back(std::move(lines));
     pous_.push_back({sizeof(Plc_Pou), name, file, lines_.back().data(),
                      static_cast<unsigned>(lines_.back().size()), 0, locals.data(),
-                     static_cast<unsigned>(locals.size())});
+                     static_cast<unsigned>(locals.size()), arrays.data(),
+                     static_cast<unsigned>(arrays.size())});
     return sut.declare(&pous_.back());
   }
+
+  static std::optional<LocalElement> whole(std::uint32_t local) { return LocalElement{.local = local}; }
 
   PouCollection sut;
   std::deque<Plc_Pou> pous_;
@@ -99,15 +103,15 @@ TEST_F(DeclaredPous, HaveLocalVariables) {
                      {"at.y", PLC_TYPE_LINT, 0, 0, 0}}),
             ERR_OK);
   const DeclaredPou& pou = sut.pous().front();
-  EXPECT_EQ(pou.local("X", 3), 0U);
-  EXPECT_EQ(pou.local("x", 5), 1U) << "that of the narrowest lines";
-  EXPECT_EQ(pou.local("name", 9), 2U);
-  EXPECT_EQ(pou.local("name", 8), std::nullopt);
-  EXPECT_EQ(pou.local("name", 12), std::nullopt);
-  EXPECT_EQ(pou.local("at.Y", 11), 3U);
-  EXPECT_EQ(pou.local("z", 3), std::nullopt);
-  EXPECT_EQ(pou.locals[0].bytes, 2U);
-  EXPECT_EQ(pou.locals[2].bytes, 81U);
+  EXPECT_EQ(pou.local("X", 3).value(), whole(0));
+  EXPECT_EQ(pou.local("x", 5).value(), whole(1)) << "that of the narrowest lines";
+  EXPECT_EQ(pou.local("name", 9).value(), whole(2));
+  EXPECT_EQ(pou.local("name", 8).value(), std::nullopt);
+  EXPECT_EQ(pou.local("name", 12).value(), std::nullopt);
+  EXPECT_EQ(pou.local("at.Y", 11).value(), whole(3));
+  EXPECT_EQ(pou.local("z", 3).value(), std::nullopt);
+  EXPECT_EQ(pou.locals[0].symbol.bytes, 2U);
+  EXPECT_EQ(pou.locals[2].symbol.bytes, 81U);
 }
 
 // Two methods may even stand in one line.
@@ -120,11 +124,55 @@ TEST_F(DeclaredPous, HaveTheLocalVariablesOfACall) {
   const std::array<void*, 1> addresses{&x};
   Plc_Frame frame{&pous_.back(), nullptr, 5, 0, nullptr, addresses.data(), 2, 1};
   const DeclaredPou& pou = sut.pous().front();
-  EXPECT_EQ(pou.local("x", frame), 2U);
-  EXPECT_EQ(pou.local("y", frame), std::nullopt);
+  EXPECT_EQ(pou.local("x", frame).value(), whole(2));
+  EXPECT_EQ(pou.local("y", frame).value(), std::nullopt);
   frame.dwLine = 6;
-  EXPECT_EQ(pou.local("x", frame), std::nullopt);
-  EXPECT_EQ(pou.local("x", 5), 0U);
+  EXPECT_EQ(pou.local("x", frame).value(), std::nullopt);
+  EXPECT_EQ(pou.local("x", 5).value(), whole(0));
+}
+
+TEST_F(DeclaredPous, HaveTheElementsOfLocalArrays) {
+  ASSERT_EQ(declare("Sum", "a.st", {5},
+                    {{"n", PLC_TYPE_INT, 0, 0, 0},
+                     {"grid[][]", PLC_TYPE_DINT, 0, 0, 0},
+                     {"points[].x", PLC_TYPE_INT, 0, 0, 0}},
+                    {{1, 2, {{0, 2, 12}, {2, 3, 4}}}, {2, 1, {{-1, 3, 8}}}}),
+            ERR_OK);
+  const DeclaredPou& pou = sut.pous().front();
+  EXPECT_EQ(pou.local("Grid[1, 3]", 5).value(), (LocalElement{.local = 1, .offset = 16}));
+  EXPECT_EQ(pou.local("grid[0][2]", 5).value(), (LocalElement{.local = 1, .offset = 0}));
+  EXPECT_EQ(pou.local("POINTS[1].X", 5).value(), (LocalElement{.local = 2, .offset = 16}));
+  EXPECT_EQ(type_text(pou.locals[1].symbol), "ARRAY [0..1, 2..4] OF DINT");
+  for (const char* const name : {"grid", "grid[1]", "grid[2,2]", "grid[1,1]", "grid[1,5]", "grid[]", "n[1]"})
+    EXPECT_EQ(pou.local(name, 5).error().code, ErrorCode::invalid_argument) << name;
+  EXPECT_THAT(pou.local("grid", 5).error().message, HasSubstr("name an element, as grid[0,2]"));
+  EXPECT_THAT(pou.local("points[2].x", 5).error().message, HasSubstr("allowed as index 1 are -1 to 1"));
+  EXPECT_EQ(pou.local("points[1].y", 5).value(), std::nullopt);
+}
+
+TEST_F(DeclaredPous, AreRefusedForTheirLocalArrays) {
+  const auto with = [&](const char* name, const std::vector<Plc_LocalArray>& arrays) {
+    return declare("A", "a.st", {1}, {{name, PLC_TYPE_INT, 0, 0, 0}}, arrays);
+  };
+  EXPECT_EQ(with("a[]", {}), ERR_PARAMETER);
+  EXPECT_EQ(with("a", {{0, 1, {{0, 2, 2}}}}), ERR_PARAMETER);
+  EXPECT_EQ(with("a[]", {{1, 1, {{0, 2, 2}}}}), ERR_PARAMETER);
+  EXPECT_EQ(with("a[]", {{0, 1, {{0, 2, 2}}}, {0, 1, {{0, 2, 2}}}}), ERR_PARAMETER);
+  EXPECT_EQ(with("a[]", {{0, 0, {}}}), ERR_PARAMETER);
+  EXPECT_EQ(with("a[]", {{0, 4, {{0, 2, 2}}}}), ERR_PARAMETER);
+  EXPECT_EQ(with("a[]", {{0, 1, {{0, 0, 2}}}}), ERR_PARAMETER);
+  EXPECT_EQ(with("a[]", {{0, 1, {{0, 1U << 20U, 1U << 20U}}}}), ERR_PARAMETER);
+  EXPECT_TRUE(sut.pous().empty());
+  EXPECT_EQ(with("a[]", {{0, 1, {{0, 2, 2}}}}), ERR_OK);
+}
+
+// As plc_debug.h was.
+TEST_F(DeclaredPous, OfABuildThatKnowsNoLocalArraysAreThere) {
+  const std::array lines{5U};
+  const std::array locals{Plc_Local{"n", PLC_TYPE_INT, 0, 0, 0}};
+  Plc_Pou pou{56, "A", "a.st", lines.data(), 1, 0, locals.data(), 1, nullptr, 7};
+  ASSERT_EQ(sut.declare(&pou), ERR_OK);
+  EXPECT_EQ(sut.pous().front().locals.size(), 1U);
 }
 
 TEST_F(DeclaredPous, AreRefusedForTheirLocalVariables) {
@@ -141,7 +189,7 @@ TEST_F(DeclaredPous, AreRefusedForTheirLocalVariables) {
   EXPECT_EQ(with({"a", PLC_TYPE_STRING, PLC_MAX_STRING + 1, 0, 0}), ERR_PARAMETER);
   EXPECT_EQ(with({"a", PLC_TYPE_INT, 0, 5, 4}), ERR_PARAMETER);
   EXPECT_EQ(with({"a", PLC_TYPE_INT, 0, 0, 4}), ERR_PARAMETER);
-  Plc_Pou pou{sizeof(Plc_Pou), "A", "a.st", lines_.back().data(), 1, 0, nullptr, 1};
+  Plc_Pou pou{sizeof(Plc_Pou), "A", "a.st", lines_.back().data(), 1, 0, nullptr, 1, nullptr, 0};
   EXPECT_EQ(sut.declare(&pou), ERR_PARAMETER);
   EXPECT_TRUE(sut.pous().empty());
 }

@@ -45,14 +45,18 @@ static const unsigned int other_lines[] = {32, 33};
 static const unsigned int edge_lines[] = {42};
 static const unsigned int lamp_lines[] = {52};
 static const unsigned int deep_lines[] = {62};
-static const Plc_Local twice_locals[] = {
-    {"value", PLC_TYPE_DINT, 0, 0, 0}, {"factor", PLC_TYPE_INT, 0, 0, 0}, {"word", PLC_TYPE_STRING, 8, 0, 0}};
-static Plc_Pou twice = {sizeof(Plc_Pou), "Twice", "src/steps.st", twice_lines, 1, 0, twice_locals, 3};
-static Plc_Pou counter = {sizeof(Plc_Pou), "Counter", "src/steps.st", counter_lines, 2, 0, 0, 0};
-static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "src/steps.st", main_lines, 4, 0, 0, 0};
-static Plc_Pou other = {sizeof(Plc_Pou), "Other", "src/steps.st", other_lines, 2, 0, 0, 0};
-static Plc_Pou edge = {sizeof(Plc_Pou), "Edge", "src/steps.st", edge_lines, 1, 0, 0, 0};
-static Plc_Pou lamp = {sizeof(Plc_Pou), "Lamp", "src/steps.st", lamp_lines, 1, 0, 0, 0};
+static const Plc_Local twice_locals[] = {{"value", PLC_TYPE_DINT, 0, 0, 0},
+                                         {"factor", PLC_TYPE_INT, 0, 0, 0},
+                                         {"word", PLC_TYPE_STRING, 8, 0, 0},
+                                         {"cells[]", PLC_TYPE_INT, 0, 0, 0}};
+static const Plc_LocalArray twice_arrays[] = {{3, 1, {{1, 300, sizeof(short)}}}};
+static Plc_Pou twice = {sizeof(Plc_Pou), "Twice", "src/steps.st", twice_lines, 1, 0, twice_locals, 4,
+                        twice_arrays,    1};
+static Plc_Pou counter = {sizeof(Plc_Pou), "Counter", "src/steps.st", counter_lines, 2, 0, 0, 0, 0, 0};
+static Plc_Pou main_pou = {sizeof(Plc_Pou), "Main", "src/steps.st", main_lines, 4, 0, 0, 0, 0, 0};
+static Plc_Pou other = {sizeof(Plc_Pou), "Other", "src/steps.st", other_lines, 2, 0, 0, 0, 0, 0};
+static Plc_Pou edge = {sizeof(Plc_Pou), "Edge", "src/steps.st", edge_lines, 1, 0, 0, 0, 0, 0};
+static Plc_Pou lamp = {sizeof(Plc_Pou), "Lamp", "src/steps.st", lamp_lines, 1, 0, 0, 0, 0, 0};
 #define DEEP_TEXT(name) {name, PLC_TYPE_STRING, sizeof label, 0, 0}
 static const Plc_Local deep_locals[] = {{"level", PLC_TYPE_INT, 0, 0, 0},
                                         DEEP_TEXT("a"),
@@ -63,7 +67,7 @@ static const Plc_Local deep_locals[] = {{"level", PLC_TYPE_INT, 0, 0, 0},
                                         DEEP_TEXT("f"),
                                         DEEP_TEXT("g"),
                                         DEEP_TEXT("h")};
-static Plc_Pou deep = {sizeof(Plc_Pou), "Deep", "src/steps.st", deep_lines, 1, 0, deep_locals, 9};
+static Plc_Pou deep = {sizeof(Plc_Pou), "Deep", "src/steps.st", deep_lines, 1, 0, deep_locals, 9, 0, 0};
 
 static void run_deep(short level) {
   void* const locals[] = {&level, label, label, label, label, label, label, label, label};
@@ -75,10 +79,11 @@ static void run_deep(short level) {
 static int run_twice(int value) {
   short factor = 2;
   char word[8] = "double";
-  void* const locals[] = {&value, &factor, word};
+  short cells[300] = {(short)value, 7};
+  void* const locals[] = {&value, &factor, word, cells};
   PLC_ENTER_LOCALS(twice, 0, locals, 0);
   PLC_STATEMENT(2);
-  return factor * value;
+  return factor * value + cells[2];
 }
 
 static void run_counter(struct counter* self) {
