@@ -27,20 +27,26 @@ std::string text_of(const std::string& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
+/// As each compiler has them.
+class Examples : public testing::TestWithParam<iec::Compiler> {
+ protected:
+  void read(const std::string& name);
+  Example sut;
+};
+
 /// With its task file, as a build reads it.
-void read(const std::string& name, Example& example) {
+void Examples::read(const std::string& name) {
   const std::string file = std::string(EXAMPLES) + "/" + name + "/" + name;
   const std::vector<iec::Source> sources{{name + ".st", text_of(file + ".st")}};
   auto [project, problems] = iec::read_project(sources);
   ASSERT_THAT(problems, IsEmpty());
-  example.project = std::move(project);
-  ASSERT_EQ(example.project.configurations.size(), 1U);
-  iec::Configuration& configuration = example.project.configurations.front();
+  sut.project = std::move(project);
+  ASSERT_EQ(sut.project.configurations.size(), 1U);
+  iec::Configuration& configuration = sut.project.configurations.front();
   ASSERT_THAT(iec::read_task_file({name + ".toml", text_of(file + ".toml")}, configuration), IsEmpty());
   ASSERT_EQ(configuration.resources.size(), 1U);
-  example.plan =
-      iec::plan_tasks(example.project, configuration, configuration.resources.front(), iec::Compiler::matiec);
-  ASSERT_THAT(example.plan.problems, IsEmpty());
+  sut.plan = iec::plan_tasks(sut.project, configuration, configuration.resources.front(), GetParam());
+  ASSERT_THAT(sut.plan.problems, IsEmpty());
 }
 
 std::vector<std::string> tasks_of(const Example& example) {
@@ -62,27 +68,29 @@ void expect_places_in_the_areas(const Example& example) {
     EXPECT_LE(place.offset + place.bytes, kImage) << variables.front()->location;
 }
 
-TEST(Examples, TheTrafficLightHasOneTask) {
-  Example sut;
-  ASSERT_NO_FATAL_FAILURE(read("traffic_light", sut));
+TEST_P(Examples, TheTrafficLightHasOneTask) {
+  ASSERT_NO_FATAL_FAILURE(read("traffic_light"));
   EXPECT_THAT(tasks_of(sut), ElementsAre("lights 5 20 ms"));
   expect_places_in_the_areas(sut);
 }
 
-TEST(Examples, TheTemperatureLoopIsOneTaskAndItsPlantAnother) {
-  Example sut;
-  ASSERT_NO_FATAL_FAILURE(read("temperature", sut));
+TEST_P(Examples, TheTemperatureLoopIsOneTaskAndItsPlantAnother) {
+  ASSERT_NO_FATAL_FAILURE(read("temperature"));
   EXPECT_THAT(tasks_of(sut), ElementsAre("regulate 4 50 ms", "simulate 10 10 ms"));
   expect_places_in_the_areas(sut);
 }
 
-TEST(Examples, ThePackingLineHasATaskOfEachKind) {
-  Example sut;
-  ASSERT_NO_FATAL_FAILURE(read("packing", sut));
+TEST_P(Examples, ThePackingLineHasATaskOfEachKind) {
+  ASSERT_NO_FATAL_FAILURE(read("packing"));
   EXPECT_THAT(tasks_of(sut),
               ElementsAre("halting 0 edge of emergency_stop", "counting 1 product", "conveying 3 10 ms"));
   expect_places_in_the_areas(sut);
 }
+
+INSTANTIATE_TEST_SUITE_P(Of, Examples, testing::Values(iec::Compiler::matiec, iec::Compiler::strucpp),
+                         [](const auto& compiler) {
+                           return compiler.param == iec::Compiler::matiec ? "matiec" : "strucpp";
+                         });
 
 }  // namespace
 }  // namespace plchost
