@@ -121,6 +121,7 @@ class Build {
 
   bool choose() {
     translator_ = choose_translator(context_);
+    if (translator_ != nullptr) projects_.fit_lengths(context_.sources, translator_->compiler());
     return translator_ != nullptr;
   }
 

@@ -85,6 +85,7 @@ int export_plant(CliSession& session, const std::vector<std::string>& names, con
   const std::string xml = plcopen::project_of(exported->plant);
   if (std::fwrite(xml.data(), 1, xml.size(), stdout) != xml.size() || std::fflush(stdout) != 0)
     return CliSession::fail(failure(ErrorCode::system, "cannot write the plant", errno).error());
+  fmt::print(stderr, "{}\n", plcopen::kNotExported);
   int code = kExitDone;
   for (const Error& problem : exported->problems) code = CliSession::fail(problem);
   return code;

@@ -41,8 +41,28 @@ ExportedTask task_of(const plc_TaskStatus& task) {
           .event = std::string(dds::text_of(task.external_event))};
 }
 
+constexpr std::string_view kText = "STRING[";
+constexpr std::string_view kLengthOfMatiec = "126";
+constexpr std::string_view kLengthOfStrucpp = "254";
+
+// Behind "ARRAY ... OF "; empty: of no text.
+std::string_view length_in(std::string_view type) {
+  const std::size_t of = type.find("] OF ");
+  if (of != std::string_view::npos) type.remove_prefix(of + 5);
+  if (!type.starts_with(kText)) return {};
+  return type.substr(kText.size(), type.find(']') - kText.size());
+}
+
+// Of an application with the one length of MATIEC no text has a length: its build takes some only without it.
+bool tell_lengths(std::span<const ListedVariable> variables) {
+  return std::ranges::any_of(variables, [](const ListedVariable& variable) {
+    const std::string_view length = length_in(dds::text_of(variable.type));
+    return !is_program(variable) && !length.empty() && length != kLengthOfMatiec;
+  });
+}
+
 // "Pump[].speed[][]" as ARRAY [1..4, 0..2, 0..3] OF INT: "Pump[1..4].speed", ARRAY [0..2, 0..3] OF INT.
-ExportedVariable variable_of(const plc_VariableRecord& record) {
+ExportedVariable variable_of(const plc_VariableRecord& record, bool with_lengths) {
   const std::string_view area = dds::text_of(record.area);
   const bool retain = area == "retain";  // plc_variables.h
   ExportedVariable variable{
@@ -68,8 +88,8 @@ ExportedVariable variable_of(const plc_VariableRecord& record) {
     variable.path += name.front();
     name.remove_prefix(1);
   }
-  // The compilers have different words for the length of a text.
-  if (type.starts_with("STRING[")) type = "STRING";
+  const std::string_view length = length_in(type);
+  if (!length.empty() && (!with_lengths || length == kLengthOfStrucpp)) type = "STRING";
   variable.type = here.empty() ? std::string(type) : fmt::format("ARRAY [{}] OF {}", here, type);
   return variable;
 }
@@ -110,11 +130,12 @@ ExportedInstance exported_instance(std::string_view name, std::span<const plc_Ta
                                    std::span<const ListedVariable> variables) {
   ExportedInstance instance{.name = std::string(name), .tasks = {}, .programs = {}, .variables = {}};
   std::vector<ListedVariable> programs;
+  const bool with_lengths = tell_lengths(variables);
   for (const ListedVariable& variable : variables) {
     if (is_program(variable)) {
       programs.push_back(variable);
     } else {
-      instance.variables.push_back(variable_of(variable));
+      instance.variables.push_back(variable_of(variable, with_lengths));
     }
   }
   const std::vector<VariableGroup> groups =

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <pugixml.hpp>
@@ -81,6 +82,44 @@ iec::Source ProjectSources::take(const iec::Source& xml, iec::SourceProblems& pr
   if (read.problems.empty()) texts_.emplace_back(xml.file, std::move(read.text));
   std::ranges::move(read.problems, std::back_inserter(problems));
   return source;
+}
+
+namespace {
+
+// The length in "STRING[80]": all else stays where it is. False: there is none.
+bool change_lengths(std::string& text, iec::Compiler compiler) {
+  bool found = false;
+  const std::vector<iec::Token> tokens = iec::tokens_of(text, "").all;
+  for (std::size_t i = 0; i + 3 < tokens.size(); ++i) {
+    const bool is_text = tokens[i].is("STRING") || tokens[i].is("WSTRING");
+    if (!is_text || !tokens[i + 1].is("[")) continue;
+    const auto end = std::find_if(tokens.begin() + static_cast<std::ptrdiff_t>(i), tokens.end(),
+                                  [](const iec::Token& token) { return token.is("]"); });
+    if (end == tokens.end()) break;
+    found = true;
+    const std::size_t begin = tokens[i + 1].offset;
+    if (compiler == iec::Compiler::strucpp) {
+      text[begin] = '(';
+      text[end->offset] = ')';
+    } else {
+      text.replace(begin, end->offset + 1 - begin, end->offset + 1 - begin, ' ');
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+// They are generated in brackets.
+void ProjectSources::fit_lengths(std::vector<iec::Source>& sources, iec::Compiler compiler) {
+  for (iec::Source& source : sources) {
+    const auto text = std::ranges::find(texts_, source.file, &decltype(texts_)::value_type::first);
+    if (text == texts_.end() || !change_lengths(source.text, compiler)) continue;
+    if (compiler == iec::Compiler::matiec) {
+      remarks_.push_back({{source.file, 0, 0},
+                          "the lengths of its texts are not taken: MATIEC gives each text 126 characters"});
+    }
+  }
 }
 
 void ProjectSources::add_events(iec::Configuration& configuration) const {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "instances/adapters/iec/compiler.hpp"
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/source_place.hpp"
 #include "instances/adapters/plcopen/generated_text.hpp"
@@ -33,6 +34,9 @@ class ProjectSources {
  public:
   /// Its ST, under the same name. All problems in it come to `problems`.
   [[nodiscard]] iec::Source take(const iec::Source& xml, iec::SourceProblems& problems);
+  /// The lengths of texts become those that the compiler knows, in those of `sources` that are XML. MATIEC
+  /// takes none in arrays and structures, and no text with one in its functions.
+  void fit_lengths(std::vector<iec::Source>& sources, iec::Compiler compiler);
   /// The external events of tasks come to those to which a task file gives none.
   void add_events(iec::Configuration& configuration) const;
   /// Problems and remarks of the ST get their places in the XML. The remarks of all XML come to the others.

@@ -202,6 +202,7 @@ class Writer {
     set(file, "productVersion", plant.product_version);
     set(file, "creationDateTime", plant.time);
     xml_node content = add(project, "contentHeader", "plant");
+    content.append_child("Comment").text() = kNotExported.data();
     xml_node coordinates = content.append_child("coordinateInfo");
     for (const char* const language : {"fbd", "ld", "sfc"}) {
       const xml_node scaling = coordinates.append_child(language).append_child("scaling");

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace plchost::plcopen {
@@ -49,6 +50,11 @@ struct ExportedPlant {
   std::string time;  ///< of the export, as "2026-01-31T12:00:00"
   std::vector<ExportedHost> hosts;
 };
+
+/// For people, also in the file.
+inline constexpr std::string_view kNotExported =
+    "not exported, as a running instance does not tell it: bodies, initial values, functions, constants of "
+    "MATIEC, temporary variables and VAR_IN_OUT; function blocks are structures of their variables";
 
 /// PLCopen TC6 XML 2.01: each host is a configuration, each instance a resource. Bodies are not known, so
 /// those of POUs have no statement. Names become those that ST allows; where they differ, a documentation

@@ -36,13 +36,16 @@ END
 file_has() { is "$(in_file "$1")" "$2" || fail "$1: $(in_file "$1") instead of $2"; }
 
 echo "- tasks, programs and variables of two instances"
-plcctl export plant line1 line2 >"$cell/plant.xml" || fail "not exported"
+plcctl export plant line1 line2 >"$cell/plant.xml" 2>"$cell/said" || fail "not exported"
+grep -q "not exported, .*bodies" "$cell/said" || fail "it does not say that bodies are missing: $(cat "$cell/said")"
+file_has 'root.find("contentHeader/Comment").text[:12]' "not exported"
 file_has 'names(".//configuration") + ": " + names(".//resource")' "cell: line1 line2"
 file_has 'names(".//resource[@name=\"line1\"]/task", "interval") + " " + names(".//resource[@name=\"line1\"]/task")' "T#2ms T#20ms Fast Slow"
 file_has 'names(".//pou[@name=\"fast_type\"]//localVars/variable")' "count twice"
 file_has 'names(".//resource[@name=\"line1\"]/globalVars/variable")' "grid line"
 file_has 'names(".//dataType[@name=\"line_type\"]//variable")' "label setpoint stopped total"
 file_has 'names(".//resource[@name=\"line1\"]//dimension", "upper")' "2 2"
+file_has 'names(".//dataType[@name=\"line_type\"]//string", "length")' 15
 file_has 'names(".//resource[@name=\"line2\"]/task")' "$(plcctl list tasks line2 --json | jq -r 'map(.task) | join(" ")')"
 file_has 'names(".//resource[@name=\"line2\"]/task//PlchostTask", "external_event")' stop
 refused "'line7'" plcctl export plant line7

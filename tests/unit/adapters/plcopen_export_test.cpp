@@ -238,5 +238,30 @@ TEST(PlcopenSchema, HoldsForWhatIsExported) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(PlcopenExport, SaysInTheFileWhatItDoesNotHave) {
+  EXPECT_THAT(project_of(plant_of({line()})), HasSubstr("<Comment>not exported"));
+}
+
+TEST(PlcopenSources, HaveLengthsOfTextsAsTheCompilerKnowsThem) {
+  const std::string xml = project_of(plant_of({line()}));
+  ProjectSources sut;
+  iec::SourceProblems problems;
+  std::vector<iec::Source> sources{sut.take({"plant.xml", xml}, problems), {"b.st", "a : STRING[80];"}};
+  const std::string before = sources[0].text;
+  EXPECT_THAT(before, HasSubstr("NAMES : ARRAY[1..3, 0..1] OF STRING[80];"));
+  std::vector<iec::Source> of_matiec = sources;
+  sut.fit_lengths(of_matiec, iec::Compiler::matiec);
+  EXPECT_THAT(of_matiec[0].text, HasSubstr("NAMES : ARRAY[1..3, 0..1] OF STRING    ;"));
+  EXPECT_EQ(of_matiec[0].text.size(), before.size());
+  EXPECT_EQ(of_matiec[1].text, "a : STRING[80];") << "as its author wrote it";
+  iec::SourceProblems remarks;
+  sut.restore(problems, remarks);
+  EXPECT_THAT(remarks.back().text, HasSubstr("MATIEC gives each text 126 characters"));
+  sut.fit_lengths(sources, iec::Compiler::strucpp);
+  EXPECT_THAT(sources[0].text, HasSubstr("NAMES : ARRAY[1..3, 0..1] OF STRING(80);"));
+  EXPECT_EQ(sources[0].text.size(), before.size());
+  EXPECT_EQ(sources[1].text, "a : STRING[80];") << "as its author wrote it";
+}
+
 }  // namespace
 }  // namespace plchost::plcopen

@@ -115,9 +115,26 @@ TEST(ExportedInstance, HasVariablesWithTheBoundsOfTheirArrays) {
   std::vector<std::string> found;
   for (const auto& one : exported_instance("line1", {}, variables).variables)
     found.push_back(one.path + " " + one.address + ": " + one.type);
-  EXPECT_THAT(found, ElementsAre("grid : ARRAY [1..2, -1..2] OF INT", "label %QX0.1: STRING",
+  EXPECT_THAT(found, ElementsAre("grid : ARRAY [1..2, -1..2] OF INT", "label %QX0.1: STRING[80]",
                                  "pump[1..4].blade[0..2, 5..6].angle : REAL",
-                                 "pump[1..4].hours : ARRAY [0..9] OF STRING", " : "));
+                                 "pump[1..4].hours : ARRAY [0..9] OF STRING[8]", " : "));
+}
+
+// A length that a compiler gives to all texts without one is none.
+TEST(ExportedInstance, HasTextsWithTheLengthsThatTheyWereGiven) {
+  const auto types_of = [](const std::vector<ListedVariable>& variables) {
+    std::vector<std::string> types;
+    for (const auto& one : exported_instance("line1", {}, variables).variables) types.push_back(one.type);
+    return types;
+  };
+  EXPECT_THAT(
+      types_of({variable("a", "STRING[20]"), variable("b", "STRING[254]"), variable("c", "STRING[126]")}),
+      ElementsAre("STRING[20]", "STRING", "STRING[126]"));
+  const ListedVariable program = variable("one", "STRING[6]", "fast", "program");
+  EXPECT_THAT(
+      types_of({program, variable("a[]", "ARRAY [1..2] OF STRING[126]"), variable("b", "STRING[126]")}),
+      ElementsAre("ARRAY [1..2] OF STRING", "STRING"))
+      << "of MATIEC";
 }
 
 }  // namespace
