@@ -130,6 +130,15 @@ class PLCHOST_CLIENT_API Client {
     std::vector<Variable> variables;
   };
 
+  /// How variables are recorded.
+  struct RecordOptions {
+    std::chrono::milliseconds interval{100};  ///< from one sample to the next, 10 ms to an hour
+    std::chrono::milliseconds duration{0};    ///< up to 1e9 s; 0: no end after a time
+    unsigned long long count = 0;             ///< of samples; 0: no end after a number
+  };
+  /// Takes the next lines of a recording. False: it is enough.
+  using RecordSink = std::function<bool(const std::string& lines)>;
+
   /// A variable that is forced.
   struct Force : Variable {
     std::string host;
@@ -269,6 +278,22 @@ class PLCHOST_CLIENT_API Client {
   /// The same, with their values of one moment. ClientError: full: more than 1024, or 96 KiB of them.
   Sample sample(const std::string& host, const std::string& instance,
                 const std::vector<std::string>& patterns);
+  /// Writes samples into a file as CSV, as `plcctl record variables` does: a line with the names, then a line
+  /// for each sample(). Returns their number after the duration or the count, whichever comes first; one of
+  /// them must be given. The file is made with the first sample, and replaces one of that name. A host or
+  /// instance that is started anew meanwhile is waited for. Calls and watches hold up no sample. Samples that
+  /// were written stay. Not from a callback of a call or of a watch of variables: wrong_state. ClientError:
+  /// as sample(), at the first sample. timed_out, unavailable or busy: also if there was no answer at the
+  /// end. wrong_state: the application has other variables by now. failed: the file takes no more.
+  unsigned long long record_variables(const std::string& host, const std::string& instance,
+                                      const std::vector<std::string>& patterns, const RecordOptions& options,
+                                      const std::string& file);
+  /// The same; gives the lines to `sink`, on this thread: first the names and a sample, then a sample each
+  /// time. With neither duration nor count it goes on until `sink` returns false. An exception of `sink` ends
+  /// it, and comes out of this call.
+  unsigned long long record_variables(const std::string& host, const std::string& instance,
+                                      const std::vector<std::string>& patterns, const RecordOptions& options,
+                                      const RecordSink& sink);
   /// The variables of a host that are forced, with the values that they are forced to; of an array, each
   /// element that is. Empty instance: of all. ClientError: not_found: no such instance.
   std::vector<Force> forces(const std::string& host = {}, const std::string& instance = {});

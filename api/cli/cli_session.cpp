@@ -178,9 +178,4 @@ std::unexpected<Error> unknown_name(std::string_view what, std::string_view name
                                                    hint(name, known), fmt::join(known, ", ")));
 }
 
-bool comes_back(const Error& error) noexcept {
-  return error.code == ErrorCode::timed_out || error.code == ErrorCode::unavailable ||
-         error.code == ErrorCode::busy;
-}
-
 }  // namespace plchost

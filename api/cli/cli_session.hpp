@@ -79,9 +79,6 @@ class CliSession {
   std::unique_ptr<ControlClient> client_;
 };
 
-/// Whether asking again may help: a server or an instance was started anew, or is busy.
-[[nodiscard]] bool comes_back(const Error& error) noexcept;
-
 /// One of the functions of ControlClient that give all samples of a topic of one host.
 template <class Sample>
 using Snapshot = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);

@@ -19,6 +19,14 @@ void Sampling::end() {
     if (client_ != nullptr) client_->wake();
   }
   if (thread_.joinable()) thread_.join();
+  std::vector<Asking> never;
+  const std::lock_guard lock(mutex_);
+  std::swap(never, new_);
+}
+
+bool Sampling::is_here() {
+  const std::lock_guard lock(mutex_);
+  return thread_.get_id() == std::this_thread::get_id();
 }
 
 void Sampling::begin(Asking asking) {

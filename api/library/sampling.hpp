@@ -31,8 +31,10 @@ class Sampling {
 
   /// Those that ask end where they are. Not from one of them.
   void end();
-  /// Its thread starts with the first.
+  /// Its thread starts with the first. An asking that never begins, or that ends where it is, is destroyed.
   void begin(Asking asking);
+  /// Whether this is its thread.
+  [[nodiscard]] bool is_here();
 
  private:
   void work();

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "api/client/client_core_status.hpp"
+#include "api/client/variable_recording.hpp"
 #include "api/dds/page_sample.hpp"
 #include "api/dds/text.hpp"
 #include "api/library/calls.hpp"
@@ -101,11 +102,24 @@ std::string assignment(const std::string& name, const std::string& value) {
 
 Async<Result<Client::Sample>> read_sample(ClientCore& core, std::string host, std::string instance,
                                           VariableQuery query, TimePoint deadline) {
-  PLCHOST_CO_TRY_ASSIGN(const auto page, co_await core.list_variables(host, instance, query, deadline));
-  PLCHOST_CO_TRY(is_whole(page));
+  PLCHOST_CO_TRY_ASSIGN(auto listed, co_await core.list_variables(host, instance, query, deadline));
+  PLCHOST_CO_TRY_ASSIGN(const auto page, sample_in(std::move(listed), instance, query));
   Client::Sample sample{.time = wall_time(page.time_unix_ns), .consistent = page.consistent, .variables = {}};
   for (const plc_VariableRecord& variable : page.variables) sample.variables.push_back(to_public(variable));
   co_return sample;
+}
+
+void check_sample_interval(std::chrono::milliseconds interval) {
+  if (interval >= kMinSampleInterval && interval <= kMaxSampleInterval) return;
+  throw_client_error({ErrorCode::invalid_argument, 0,
+                      fmt::format("interval {} ms: allowed are {} to {}", interval.count(),
+                                  kMinSampleInterval.count(), kMaxSampleInterval.count())});
+}
+
+VariableQuery checked_query(const std::vector<std::string>& patterns) {
+  VariableQuery query{.patterns = patterns};
+  if (const auto good = part_of(query); !good) throw_client_error(good.error());
+  return query;
 }
 
 std::vector<Client::Variable> Client::variables(const std::string& host, const std::string& instance,

@@ -4,8 +4,6 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "api/library/calls.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/variables.hpp"
@@ -17,16 +15,7 @@ namespace plchost {
 
 namespace {
 
-constexpr std::chrono::milliseconds kMinInterval(10);
-constexpr std::chrono::milliseconds kMaxInterval = std::chrono::hours(1);
 constexpr auto kLookIfStopped = std::chrono::seconds(1);
-
-void check_interval(std::chrono::milliseconds interval) {
-  if (interval >= kMinInterval && interval <= kMaxInterval) return;
-  throw_client_error({ErrorCode::invalid_argument, 0,
-                      fmt::format("interval {} ms: allowed are {} to {}", interval.count(),
-                                  kMinInterval.count(), kMaxInterval.count())});
-}
 
 Client::Sampled sampled_of(Result<Client::Sample> sample) {
   if (sample) return {.code = 0, .text = {}, .sample = *std::move(sample)};
@@ -84,9 +73,8 @@ Client::Watch Client::watch_variables(const std::string& host, const std::string
                                       std::chrono::milliseconds interval,
                                       std::function<void(const Sampled&)> callback) {
   check_callback(static_cast<bool>(callback));
-  check_interval(interval);
-  const VariableQuery query{.patterns = patterns};
-  if (const auto good = part_of(query); !good) throw_client_error(good.error());
+  check_sample_interval(interval);
+  const VariableQuery query = checked_query(patterns);
   if (!host.empty()) worker_->check_watched(host);
   if (const auto ours = worker_->maker().check(); !ours) throw_client_error(ours.error());
   auto watch = std::make_shared<VariablesWatch>(

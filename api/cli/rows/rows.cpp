@@ -2,12 +2,10 @@
 
 #include <charconv>
 #include <cstdint>
-#include <ctime>
 #include <span>
 #include <string_view>
 #include <system_error>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
@@ -17,10 +15,6 @@ namespace plchost {
 using dds::text_of;
 
 namespace {
-
-std::int64_t to_seconds(std::int64_t nanoseconds) {
-  return nanoseconds / 1'000'000'000;
-}
 
 // Entries are texts; a whole number in one is a number for programs.
 Row value_of(std::string_view text) {
@@ -34,13 +28,6 @@ Row value_of(std::string_view text) {
 }
 
 }  // namespace
-
-std::string time_text(std::int64_t unix_ns) {
-  if (unix_ns <= 0) return {};
-  constexpr std::int64_t kPerMillisecond = 1'000'000;
-  const auto seconds = static_cast<std::time_t>(to_seconds(unix_ns));
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(seconds), unix_ns / kPerMillisecond % 1000);
-}
 
 void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
   for (const plc_KeyValue& entry : entries) {

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/csv_text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -116,13 +117,6 @@ std::string csv_field(const Row& value) {
 }
 
 }  // namespace
-
-std::string csv_cell(std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-  std::string cell = "\"";
-  for (const char c : text) cell.append(c == '"' ? 2 : 1, c);
-  return cell + "\"";
-}
 
 std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
                          const TableStyle& style) {

@@ -58,9 +58,6 @@ struct TableStyle {
 /// An array of objects, one on each line.
 [[nodiscard]] std::string format_json(const std::vector<Row>& rows);
 
-/// A field of comma-separated values, as RFC 4180 has it: in quotes where that is needed.
-[[nodiscard]] std::string csv_cell(std::string_view text);
-
 /// Comma-separated values as in RFC 4180, but with plain line ends: a header with the names of all fields of
 /// the first row, then a line for each row. A value that is not plain stands as JSON in its field.
 [[nodiscard]] std::string format_csv(const std::vector<Row>& rows);

@@ -29,9 +29,4 @@ void mark_forced_arrays(std::vector<Row>& rows);
 /// instances/plc_variables.h.
 [[nodiscard]] bool is_program(const plc_VariableRecord& variable) noexcept;
 
-/// The first line of a recording as CSV, and the line of each sample, as RFC 4180 has it. The last column
-/// has the names of those that are forced, with blanks between, so that each other one has values alone.
-[[nodiscard]] std::string recording_head(const VariableListing& sample);
-[[nodiscard]] std::string recording_line(const VariableListing& sample);
-
 }  // namespace plchost

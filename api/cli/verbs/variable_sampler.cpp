@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
+#include "api/client/variable_recording.hpp"
 #include "api/dds/page_sample.hpp"
 
 namespace plchost {
@@ -25,12 +24,7 @@ Result<std::vector<ListedVariable>> VariableSampler::all() {
 Result<VariableListing> VariableSampler::sample(TimePoint until) {
   PLCHOST_TRY_ASSIGN(auto page, session_.client().value()->list_variables(
                                     host_, instance_, query_, std::min(session_.deadline(), until)));
-  PLCHOST_TRY(is_whole(page));
-  if (page.variables.empty() && !query_.patterns.empty()) {
-    return failure(ErrorCode::not_found, fmt::format("no variable of '{}' is like {}", instance_,
-                                                     fmt::join(query_.patterns, ", ")));
-  }
-  return page;
+  return sample_in(std::move(page), instance_, query_);
 }
 
 }  // namespace plchost

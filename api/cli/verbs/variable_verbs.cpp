@@ -172,8 +172,8 @@ int watch_variables(CliSession& session, const WatchVariablesArguments& argument
   if (!sampler) return CliSession::fail(sampler.error());
   VariableChanges changes;
   std::uint64_t lines = 0;
-  const SampleTimes times(arguments.interval_s);
-  return sample_again_and_again(*sampler, times, TimePoint::max(), [&](const VariableListing& sample) {
+  const SampleTimes times{.interval = of_seconds(arguments.interval_s)};
+  return sample_until_interrupted(*sampler, times, [&](const VariableListing& sample) {
     const auto found = changes.look(sample);
     if (found.is_first_torn) tell_torn(session);
     for (const std::string& name : found.gone)
@@ -209,7 +209,7 @@ void add_watch_variables(const Command& verb, CliSession& session) {
       .argument("INSTANCE", arguments->which.instance)
       .arguments("VARIABLE", arguments->which.names, kVariableNames)
       .option("--interval", arguments->interval_s, "seconds between two looks (default 0.5)",
-              kMinSampleInterval, kMaxSampleInterval)
+              kMinSampleSeconds, kMaxSampleSeconds)
       .option("--count", arguments->count, "end after so many lines", std::uint64_t{0}, kMaxCount);
 }
 

@@ -104,6 +104,28 @@ void define_calls(ClientClass& client) {
            NoGil());
 }
 
+/// Refused with a text if it is none of the allowed ones. 0 is allowed.
+std::chrono::milliseconds duration_of(double seconds) {
+  const auto duration = milliseconds_of(seconds);
+  const bool is_none = seconds == 0;
+  return duration.count() > 0 || is_none ? duration : std::chrono::milliseconds(-1);
+}
+
+unsigned long long record_variables(Client& self, const std::string& host, const std::string& instance,
+                                    const std::vector<std::string>& patterns, double interval,
+                                    double duration, unsigned long long count, const std::string& file,
+                                    const std::optional<py::function>& sink) {
+  if (sink && !file.empty()) throw ClientError(ClientError::invalid_argument, "name a file or a sink");
+  const Client::RecordOptions options{milliseconds_of(interval), duration_of(duration), count};
+  const auto take = [&sink](const std::string& lines) {
+    const py::gil_scoped_acquire gil;
+    return !(*sink)(ToPython()(lines)).is(py::bool_(false));
+  };
+  const py::gil_scoped_release release;
+  return sink ? self.record_variables(host, instance, patterns, options, Client::RecordSink(take))
+              : self.record_variables(host, instance, patterns, options, file);
+}
+
 void define_variables(ClientClass& client) {
   client
       .def("variables", &Client::variables, py::arg("host"), py::arg("instance"),
@@ -130,7 +152,12 @@ void define_variables(ClientClass& client) {
             return self.watch_variables(host, instance, patterns, milliseconds_of(interval), std::move(told));
           },
           py::arg("host"), py::arg("instance"), py::arg("patterns"), py::arg("interval"), py::arg("callback"),
-          "Samples the variables each interval (seconds, 0.01 to 3600) and calls back with each Sampled.");
+          "Samples the variables each interval (seconds, 0.01 to 3600) and calls back with each Sampled.")
+      .def("record_variables", &record_variables, py::arg("host"), py::arg("instance"), py::arg("patterns"),
+           py::arg("interval") = 0.1, py::arg("duration") = 0.0, py::arg("count") = 0, py::arg("file") = "",
+           py::arg("sink") = py::none(),
+           "Writes samples as CSV into a file, or gives the lines of each to sink(lines), until that returns "
+           "False. Returns their number after the duration (seconds) or the count.");
 }
 
 /// A method for a command of the table.

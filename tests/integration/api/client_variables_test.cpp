@@ -1,10 +1,15 @@
 // Variables by the client library: a real plc-instance runs them, behind a real plchost-dds.
 #include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <csignal>
+#include <fstream>
 #include <future>
 #include <mutex>
+#include <sstream>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -53,6 +58,25 @@ class Told {
   std::vector<Client::Sampled> all_;
   std::vector<TimePoint> times_;
 };
+
+std::string contents_of(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream rest(text);
+  for (std::string line; std::getline(rest, line);) lines.push_back(line);
+  return lines;
+}
+
+/// Of a line of a recording, behind its time and `consistent`.
+std::string values_in(std::string line) {
+  for (int i = 0; i < 3; ++i) line.erase(0, line.find(',') + 1);
+  return line;
+}
 
 /// Its line1 runs the application line_variables.
 class ClientVariables : public ClientLibrary {
@@ -251,6 +275,117 @@ TEST_F(ClientVariables, AreWatchedAtSeveralRates) {
       return one.name == "line.total" && one.forced && one.value == "7";
     });
   }));
+}
+
+TEST_F(ClientVariables, AreRecordedAsPlcctlRecordsThem) {
+  sut_.force_variable("hosta", "line1", "line.total", "7");
+  sut_.write_variable("hosta", "line1", "line.label", "'a,\"b'");
+  const std::vector<std::string> names{"line.label", "line.s*", "grid[1,2]", "line.total"};
+  const std::string file = host_.run_directory() + "/record.csv";
+  Client::RecordOptions thrice;
+  thrice.interval = milliseconds(10);
+  thrice.count = 3;
+  EXPECT_EQ(sut_.record_variables({}, "line1", names, thrice, file), 3U);
+  const auto ours = lines_of(contents_of(file));
+  const auto result =
+      run_plcctl(domain_.number(), {"record", "variables", "line1", "line.label", "line.s*", "grid[1,2]",
+                                    "line.total", "--interval", "0.01", "--duration", "0.02"});
+  EXPECT_EQ(result.code, 0) << result.errors;
+  const auto theirs = lines_of(result.output);
+  ASSERT_EQ(ours.size(), 4U) << contents_of(file);
+  ASSERT_GE(theirs.size(), 2U) << result.output;
+  EXPECT_EQ(ours[0], theirs[0]);
+  EXPECT_EQ(ours[0],
+            "time,time_unix_ns,consistent,\"grid[1,2]\",line.label,line.setpoint,line.stopped,"
+            "line.total,forced");
+  EXPECT_EQ(values_in(ours[1]), values_in(theirs[1]));
+  EXPECT_THAT(values_in(ours[1]), HasSubstr(",\"'a,\"\"b'\",20,"));
+  EXPECT_TRUE(ours[1].ends_with(",7,line.total")) << ours[1];
+}
+
+TEST_F(ClientVariables, AreRecordedUntilTheSinkHasEnough) {
+  std::string text;
+  const auto count =
+      sut_.record_variables("hosta", "line1", {"fast.*"}, {milliseconds(10)}, [&](const std::string& lines) {
+        text += lines;
+        return std::ranges::count(text, '\n') < 6;
+      });
+  EXPECT_EQ(count, 5U);
+  EXPECT_EQ(lines_of(text).size(), 6U) << text;
+  const auto throws = [](const std::string& /*lines*/) -> bool { throw std::out_of_range("mine"); };
+  EXPECT_THROW((void)sut_.record_variables("hosta", "line1", {"fast.*"}, {}, throws), std::out_of_range);
+}
+
+TEST_F(ClientVariables, ARecordingIsRefusedAndLeavesAnEarlierOne) {
+  const std::string file = host_.run_directory() + "/record.csv";
+  std::ofstream(file) << "an earlier one";
+  const auto refusal = [&](const std::vector<std::string>& names, const Client::RecordOptions& options,
+                           const std::string& path) {
+    return error_of([&] { (void)sut_.record_variables("hosta", "line1", names, options, path); });
+  };
+  const Client::RecordOptions once{milliseconds(10), milliseconds(0), 1};
+  EXPECT_EQ(refusal({"line.totel"}, once, file).code(), ClientError::not_found);
+  EXPECT_THAT(refusal({"line.total"}, {}, file).what(), HasSubstr("say the duration"));
+  EXPECT_THAT(refusal({"line.total"}, once, "").what(), HasSubstr("name the file"));
+  EXPECT_EQ(refusal({"line.total"}, once, host_.run_directory() + "/none/x").code(), ClientError::failed);
+  EXPECT_EQ(refusal({""}, once, file).code(), ClientError::invalid_argument);
+  EXPECT_THAT(refusal({"line.total"}, {milliseconds(9), milliseconds(1)}, file).what(),
+              HasSubstr("interval 9 ms: allowed are 10 to 3600000"));
+  EXPECT_THAT(refusal({"line.total"}, {milliseconds(10), milliseconds(-1)}, file).what(),
+              HasSubstr("duration -1 ms: allowed are 0 to"));
+  EXPECT_EQ(contents_of(file), "an earlier one");
+  EXPECT_EQ(error_of([&] {
+              (void)sut_.record_variables("hosta", "line1", {"a"}, {}, Client::RecordSink());
+            }).code(),
+            ClientError::invalid_argument);
+}
+
+TEST_F(ClientVariables, ARecordingGoesOnWithTheNextServerAndTellsOfSilenceAtItsEnd) {
+  const std::vector<std::string> total{"line.total"};
+  bool replaced = false;
+  const auto take = [&](const std::string& /*lines*/) {
+    if (!std::exchange(replaced, true)) host_.replace_server();
+    return true;
+  };
+  EXPECT_EQ(sut_.record_variables("hosta", "line1", total, {milliseconds(10), milliseconds(0), 4}, take), 4U);
+  Client impatient(options(milliseconds(300)));
+  const auto stop = [&](const std::string& /*lines*/) {
+    process_.signal(SIGSTOP);
+    return true;
+  };
+  const ClientError silent = error_of([&] {
+    (void)impatient.record_variables("hosta", "line1", total, {milliseconds(10), milliseconds(500)}, stop);
+  });
+  process_.signal(SIGCONT);
+  EXPECT_TRUE(silent.code() == ClientError::timed_out || silent.code() == ClientError::unavailable)
+      << silent.code() << ": " << silent.what();
+}
+
+TEST_F(ClientVariables, ARecordingEndsWithItsClientAndIsNoneOfACallback) {
+  Client other(options());
+  std::promise<void> first;
+  auto ended = std::async(std::launch::async, [&] {
+    return error_of([&] {
+      (void)other.record_variables("hosta", "line1", {"line.total"}, {std::chrono::hours(1)},
+                                   [&](const std::string& /*lines*/) {
+                                     first.set_value();
+                                     return true;
+                                   });
+    });
+  });
+  first.get_future().wait();
+  other.close();
+  EXPECT_EQ(ended.get().code(), ClientError::unavailable);
+  std::promise<int> told;
+  std::atomic<bool> is_told{false};
+  const auto watch = sut_.watch_variables(
+      "hosta", "line1", {"line.total"}, milliseconds(10), [&](const Client::Sampled& /*sampled*/) {
+        if (is_told.exchange(true)) return;
+        const auto all = [](const std::string& /*lines*/) { return true; };
+        told.set_value(
+            error_of([&] { (void)sut_.record_variables("hosta", "line1", {"line.total"}, {}, all); }).code());
+      });
+  EXPECT_EQ(told.get_future().get(), ClientError::wrong_state);
 }
 
 TEST_F(ClientVariables, AWatchTellsOnceWhyThereIsNoSampleAndGoesOn) {

@@ -188,6 +188,43 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
 EOF
 PYTHONPATH=$BIN/../python python3 "$cell/sends.py" "$APPLICATIONS/packer.so" "$cell/other.so" || fail "an application that Python sends"
 
+echo "- Python records variables"
+cat >"$cell/records.py" <<'EOF'
+import os, sys, plchost_client
+with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
+    of = ("north", "press1", ["fast.*", "line.label"])
+    assert client.record_variables(*of, interval=0.02, count=5, file=sys.argv[1]) == 5
+    written = open(sys.argv[1]).read().splitlines()
+    assert len(written) == 6 and written[0].startswith("time,time_unix_ns,consistent,fast.count,"), written
+    texts = []
+    assert client.record_variables(*of, interval=0.01, sink=lambda lines: texts.append(lines) or len(texts) < 3) == 3
+    assert "".join(texts).splitlines()[0] == written[0], texts
+    assert client.record_variables(*of, duration=0.2, sink=texts.append) in range(1, 4)
+    def refused(what, **how):
+        try:
+            client.record_variables(*of, **how)
+        except plchost_client.ClientError as error:
+            assert error.code == plchost_client.ClientError.invalid_argument, error
+            assert what in str(error), error
+            return
+        raise AssertionError(f"{how} is not refused")
+    refused("say the duration", file=sys.argv[1])
+    refused("name the file", count=1)
+    refused("a file or a sink", count=1, file=sys.argv[1], sink=texts.append)
+    refused("duration -1 ms", duration=float("nan"), count=1, file=sys.argv[1])
+    refused("interval 0 ms", interval=-1.0, count=1, file=sys.argv[1])
+    def raises(lines):
+        raise KeyError("mine")
+    try:
+        client.record_variables(*of, sink=raises)
+        raise AssertionError("its exception is lost")
+    except KeyError:
+        pass
+EOF
+PYTHONPATH=$BIN/../python timeout 120 python3 "$cell/records.py" "$cell/record.csv" || fail "recordings of Python"
+plcctl record variables press1 'fast.*' line.label --duration 0.05 --interval 0.02 --file "$cell/of_plcctl.csv"
+is "$(head -n 1 "$cell/record.csv")" "$(head -n 1 "$cell/of_plcctl.csv")" || fail "the recordings of Python and plcctl differ"
+
 echo "- Python begins watches while others end"
 cat >"$cell/watches.py" <<'EOF'
 import os, plchost_client

@@ -1,15 +1,12 @@
-// How forced variables are shown, in tables and in recordings.
+// How forced variables are shown, in tables.
 #include "api/cli/rows/variable_rows.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "api/dds/text.hpp"
 
 namespace plchost {
 namespace {
-
-using ::testing::HasSubstr;
 
 plc_VariableRecord record(std::string_view name, std::string_view value, bool forced = false,
                           std::string_view forced_value = "") {
@@ -40,19 +37,6 @@ TEST(ForcedVariables, AreToldBesideAValue) {
   EXPECT_EQ(forced_text(record("a", "7", true, "7")), "forced");
   EXPECT_EQ(forced_text(record("t[]", "[1, 2]", true)), "elements forced");
   EXPECT_EQ(forced_text(record("b", "8")), "");
-}
-
-TEST(Recording, NamesInTheLastColumnWhatIsForced) {
-  VariableListing sample{.time_unix_ns = 1'600'000'000'000'000'000,
-                         .variables = {record("a", "7"), record("grid[1,2]", "8"), record("s", "'x,y'")}};
-  EXPECT_EQ(recording_head(sample), "time,time_unix_ns,consistent,a,\"grid[1,2]\",s,forced");
-  EXPECT_THAT(recording_line(sample), HasSubstr(",1600000000000000000,true,7,8,\"'x,y'\","));
-  EXPECT_TRUE(recording_line(sample).ends_with(",")) << "nothing is forced";
-  sample.variables[0].forced = true;
-  EXPECT_TRUE(recording_line(sample).ends_with(",\"'x,y'\",a"));
-  sample.variables[1].forced = true;
-  EXPECT_TRUE(recording_line(sample).ends_with(",\"a grid[1,2]\""));
-  EXPECT_EQ(recording_head(sample), "time,time_unix_ns,consistent,a,\"grid[1,2]\",s,forced");
 }
 
 }  // namespace
