@@ -89,6 +89,9 @@ void Manager::take_over_host(const ManagerConfig& now, std::vector<std::string>&
   };
   if (has_changed("[host] housekeeping_cores")) use_housekeeping_cores(lines);
   if (has_changed("[host] pool_")) use_pool_rights(lines);
+  if (has_changed("[host] allow_debug")) {
+    std::ranges::move(supervisor_->tell_debug_builds(), std::back_inserter(lines));
+  }
   const bool served_anew =
       std::ranges::find(changes, TakesEffect::new_server, &KeyChange::when) != changes.end();
   if (has_changed("[dds] ")) share_with_server();

@@ -138,7 +138,7 @@ constexpr std::array kHostKeys = {
     host<&HostConfig::allow_debug, TruthKey>(
         {.name = "allow_debug",
          .when = at_once,
-         .why = "by processes that are started from then on",
+         .why = "by commands of debuggers, and by processes that are started from then on",
          .meaning = "false: instances refuse applications that are debug builds, whose tasks an engineer can "
                     "halt"}),
     host<&HostConfig::keep_pool, TruthKey>(

@@ -106,9 +106,10 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
       return request.argument.empty() ? Result<void>() : check_name("task", request.argument, kMaxTaskName);
     case OperationArgument::variable_value:
     case OperationArgument::variable_or_all:  // the instance knows its variables
-    case OperationArgument::debug_command:    // and its debugger
     case OperationArgument::none:
       return {};
+    case OperationArgument::debug_command:
+      return check_debugger(request.argument);
     case OperationArgument::path:
       return check_path(request);
     case OperationArgument::file:

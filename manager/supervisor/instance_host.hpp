@@ -52,6 +52,8 @@ class InstanceHost {
   /// Writes down the faults that the process shows in its page and cannot write down itself. In words the
   /// last one; empty: it shows none.
   [[nodiscard]] virtual std::string keep_lost_faults() = 0;
+  /// The process runs a debug build, and a debugger can halt its tasks.
+  [[nodiscard]] virtual bool can_be_debugged() const = 0;
   /// Puts outputs that a process which has ended could not put into their safe state there. No debugger is
   /// shown its tasks any more.
   virtual void end_outputs() = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +13,8 @@
 
 namespace plchost {
 
+using namespace std::string_view_literals;
+
 namespace {
 
 constexpr std::array kOrders = {ControlVerb::debug, ControlVerb::write_variable, ControlVerb::force_variable,
@@ -19,11 +22,25 @@ constexpr std::array kOrders = {ControlVerb::debug, ControlVerb::write_variable,
 constexpr std::array kBreakOff = {ControlVerb::stop, ControlVerb::reset, ControlVerb::reset_cold,
                                   ControlVerb::restart};
 
+// Commands that let tasks go on. All others may halt one, or keep it halted.
+constexpr std::array kLettingGo = {"continue"sv, "delete"sv, "detach"sv};
+
 bool contains(const auto& verbs, ControlVerb verb) {
   return std::ranges::find(verbs, verb) != verbs.end();
 }
 
 }  // namespace
+
+// "SESSION COMMAND"; the instance knows the rest. A debug build may run on from a time when it was allowed.
+Result<void> ManagedInstance::check_debugger(std::string_view command) const {
+  if (surroundings_.host.allow_debug) return {};
+  command.remove_prefix(std::min(command.find(' '), command.size()));
+  command.remove_prefix(std::min(command.find_first_not_of(' '), command.size()));
+  if (std::ranges::find(kLettingGo, command.substr(0, command.find(' '))) != kLettingGo.end()) return {};
+  return failure(ErrorCode::refused,
+                 "this host says allow_debug = false: of the debugger's commands only continue, delete and "
+                 "detach are carried out");
+}
 
 bool ManagedInstance::waits_for_single_cycle() const noexcept {
   return operation_ && operation_->step == Step::forwarded &&

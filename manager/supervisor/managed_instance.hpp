@@ -236,6 +236,7 @@ class ManagedInstance : public InstanceEvents {
   /// false: it is not the answer of an order.
   bool ends_order(const ControlReply& reply);
   void end_order(std::vector<ForwardedOrder>::iterator order, ErrorCode code, const std::string& text);
+  [[nodiscard]] Result<void> check_debugger(std::string_view command) const;
   void end_orders(ErrorCode code, const std::string& text);
   void end_late_orders();
   [[nodiscard]] bool waits_for_single_cycle() const noexcept;

@@ -6,11 +6,13 @@
 
 #include <fmt/format.h>
 #include <sys/epoll.h>
+#include <unistd.h>
 
 #include "manager/supervisor/instance_files.hpp"
 #include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
 
@@ -264,6 +266,10 @@ std::optional<InstanceRuntime> ProcessHost::runtime() {
 std::optional<InstanceRuntime> ProcessHost::left_runtime() const {
   const auto left = InstancePageReader::open(settings_.pool, settings_.name);
   return left ? left->runtime() : std::nullopt;
+}
+
+bool ProcessHost::can_be_debugged() const {
+  return ::access(MemoryFile::path(debug_page_name(settings_.pool, settings_.name)).c_str(), F_OK) == 0;
 }
 
 void ProcessHost::end_outputs() {

@@ -57,6 +57,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] std::string processor_taker() override;
   [[nodiscard]] std::vector<int> granted_cores() override;
   [[nodiscard]] std::string keep_lost_faults() override;
+  [[nodiscard]] bool can_be_debugged() const override;
   void end_outputs() override;
   void read_output() override;
   [[nodiscard]] std::string last_line() const override { return output_.last_line(); }

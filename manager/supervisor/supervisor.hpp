@@ -41,6 +41,8 @@ class Supervisor : public ControlHandler {
   [[nodiscard]] Result<void> check_room(const std::vector<InstanceConfig>& now) const;
   /// Takes over these instances in place of those before; see managed_instance.hpp. One line for each change.
   std::vector<std::string> reload(const std::vector<InstanceConfig>& now);
+  /// Whether the host allows debug builds is another one now: a line for each instance that runs one.
+  [[nodiscard]] std::vector<std::string> tell_debug_builds() const;
   /// The log level of the host is another one now: all instances that are up take it over.
   void use_log_level();
   /// Ends all instances in reverse order; calls `done` when none is left, possibly at once.

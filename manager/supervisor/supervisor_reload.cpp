@@ -50,6 +50,21 @@ void Supervisor::use_log_level() {
   for (const auto& unit : units_) unit->instance->use_log_level();
 }
 
+std::vector<std::string> Supervisor::tell_debug_builds() const {
+  const std::string_view effect =
+      surroundings_.host.allow_debug
+          ? "a debugger can halt its tasks again"
+          : "it runs on, sets no new breakpoints, and its next start or load of such a "
+            "build is refused";
+  std::vector<std::string> lines;
+  for (const auto& unit : units_) {
+    if (!unit->instance->has_process() || !unit->host->can_be_debugged()) continue;
+    lines.push_back(
+        fmt::format("instance '{}': runs a debug build; {}", unit->instance->config().name, effect));
+  }
+  return lines;
+}
+
 std::vector<std::string> Supervisor::reload(const std::vector<InstanceConfig>& now) {
   std::vector<std::string> lines;
   for (const auto& unit : units_) {

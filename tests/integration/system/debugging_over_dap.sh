@@ -72,10 +72,22 @@ refused "line1' application: $APPLICATIONS/steps.so is a debug build" plcctl rel
 sed -i 's/steps\.so/bottling_line.so/' "$cell/cell.toml"
 plcctl reload host >"$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
 grep -q '^\[host\] allow_debug changed' "$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
+grep -q "^instance 'line1': runs a debug build; it runs on" "$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
+if grep -q "line2.*debug build" "$cell/reloaded.txt"; then fail "line2 has none: $(cat "$cell/reloaded.txt")"; fi
+refused "allow_debug = false" plcctl debug line1 'break Main:24'
+until_true 10 runs_on
 pid=$(instance line2 pid)
 refused "allow_debug = false" plcctl load application line2 "$APPLICATIONS/steps.so"
 until_true 20 state_is line2 running
 is "$(instance line2 pid)" "$pid" || fail "line2 was restarted"
+
+echo "- where the host allows them again, a debug build that ran on is debugged"
+sed -i 's/^allow_debug = false/allow_debug = true/' "$cell/cell.toml"
+plcctl reload host >"$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
+grep -q "^instance 'line1': runs a debug build; a debugger can halt its tasks again" "$cell/reloaded.txt" || fail "$(cat "$cell/reloaded.txt")"
+plcctl debug line1 'break Main:24' wait >"$cell/again.txt" || fail "$(cat "$cell/again.txt")"
+grep -q 'task Main halts' "$cell/again.txt" || fail "$(cat "$cell/again.txt")"
+until_true 10 runs_on
 
 kill -TERM "${managers[-1]}"
 wait "${managers[-1]}" || fail "the manager ended with $?"

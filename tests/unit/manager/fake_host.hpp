@@ -41,6 +41,7 @@ class FakeHost : public InstanceHost {
   [[nodiscard]] std::string processor_taker() override { return taker; }
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
   [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
+  [[nodiscard]] bool can_be_debugged() const override { return debug_build; }
   void end_outputs() override { ++ended_outputs; }
   void read_output() override {}
   [[nodiscard]] std::string last_line() const override { return said; }
@@ -63,6 +64,7 @@ class FakeHost : public InstanceHost {
   int spawn_errno = 0;
   bool can_send = true;
   std::string lost_fault;
+  bool debug_build = false;
   int ended_outputs = 0;
   int forgotten = 0;
   std::string said;

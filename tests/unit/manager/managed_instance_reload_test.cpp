@@ -67,6 +67,31 @@ TEST_F(ManagedInstanceReload, UsesTheRestFromTheNextProcessOn) {
   EXPECT_EQ(sut().awaited_changes(), "");
 }
 
+TEST_F(ManagedInstanceReload, LetsNoDebuggerHaltTasksOnceTheHostAllowsNoDebugBuilds) {
+  bring_up();
+  host_config_.allow_debug = false;
+  for (const char* const command :
+       {"attach", "attach take", "7 break Main:3", "7 pause *", "7 step Main", "7 next Main", "7 out Main",
+        "7 until Main Main:4", "7 halts all", "7 local Main 0 n=1", "7", ""}) {
+    ask(ControlVerb::debug, command);
+    const auto reply = take_reply();
+    EXPECT_EQ(reply.code, ErrorCode::refused) << command;
+    EXPECT_THAT(reply.text, HasSubstr("this host says allow_debug = false")) << command;
+  }
+  EXPECT_TRUE(host_.requests.empty());
+  for (const char* const command : {"7 continue *", "7 delete 1", "7 detach"}) {
+    ask(ControlVerb::debug, command);
+    answer();
+    EXPECT_EQ(take_reply().code, ErrorCode::ok) << command;
+  }
+  host_config_.allow_debug = true;
+  ask(ControlVerb::debug, "attach");
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  crash_once();
+  EXPECT_FALSE(host_.spawned.back().no_debug);
+}
+
 TEST_F(ManagedInstanceReload, PutsAYoungerCommandBeforeTheConfiguration) {
   bring_up();
   config_.application = "/opt/other.so";

@@ -220,6 +220,21 @@ TEST_F(SupervisorTest, KeepsThePlaceOfEachInstanceWhenOthersComeAndGo) {
   EXPECT_EQ(observer_.shown.at(1).name.view(), "line1");
 }
 
+TEST_F(SupervisorTest, TellsWhichInstancesRunADebugBuildWhenTheyAreAllowedNoLongerOrAgain) {
+  start_all();
+  hosts_["line1"]->debug_build = hosts_["packer1"]->debug_build = true;
+  instance("packer1").on_exit(exited_with(0));
+  config_.host.allow_debug = false;
+  EXPECT_THAT(
+      sut_->tell_debug_builds(),
+      ElementsAre("instance 'line1': runs a debug build; it runs on, sets no new breakpoints, and its "
+                  "next start or load of such a build is refused"));
+  EXPECT_EQ(state("line1"), InstanceState::running);
+  config_.host.allow_debug = true;
+  EXPECT_THAT(sut_->tell_debug_builds(),
+              ElementsAre("instance 'line1': runs a debug build; a debugger can halt its tasks again"));
+}
+
 TEST_F(SupervisorTest, HasRoomForAsManyAsThePageHas) {
   start_all();
   std::vector<InstanceConfig> now(kMaxInstances - 2);
