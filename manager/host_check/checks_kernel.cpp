@@ -109,6 +109,16 @@ HostFinding throttling(const CheckedHost& host) {
   }
   if (*run_time < 0) return finding(FindingLevel::ok, kSubject, "-1: never stopped", kWhy);
   if (*run_time >= *period) return finding(FindingLevel::ok, kSubject, found + ": never stopped", kWhy);
+  const auto quiet = isolated(host.files);
+  const auto cores = plc_cores(host);
+  constexpr std::int64_t kAll = 100;
+  constexpr std::int64_t kUsual = 95;  // percent: a kernel begins with it
+  const bool usual = *run_time >= *period / kAll * kUsual;
+  if (usual && quiet && !cores.empty() && cores_without(cores, *quiet).empty()) {
+    // There -1 has little to give, and it would stop the kernel's own threads beside a task that never ends.
+    return finding(FindingLevel::ok, kSubject, found + ", on isolated cores: more only with a load above it",
+                   kWhy, "keep the load of each core below it");
+  }
   return finding(
       FindingLevel::note, kSubject, found,
       has_fair_server(host.files) ? "above this load other programs that starve take 50 ms of each second "

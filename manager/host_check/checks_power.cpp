@@ -60,8 +60,10 @@ HostFinding governor(const CheckedHost& host) {
   std::vector<int> slow;
   std::string names;
   for (const int core : plc_cores(host)) {
-    const auto name =
-        host.files.text(fmt::format("/sys/devices/system/cpu/cpu{}/cpufreq/scaling_governor", core));
+    const std::string folder = fmt::format("/sys/devices/system/cpu/cpu{}/cpufreq", core);
+    if (host.files.kernel_lacks(folder))
+      return finding(FindingLevel::ok, kSubject, "the kernel changes no frequency", kWhy);
+    const auto name = host.files.text(folder + "/scaling_governor");
     if (!name) return unknown(kSubject, name.error(), kWhy);
     if (*name == "performance") continue;
     slow.push_back(core);

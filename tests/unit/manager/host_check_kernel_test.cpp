@@ -87,6 +87,20 @@ TEST(HostCheckKernel, JudgesThrottlingByWhatIsLeft) {
   EXPECT_THAT(tree.look("throttling").found, HasSubstr("holds 'much'"));
 }
 
+TEST(HostCheckKernel, LeavesTheUsualThrottlingAloneOnIsolatedCores) {
+  const FakeTree tree;
+  const std::string run_time = "/proc/sys/kernel/sched_rt_runtime_us";
+  tree.write(run_time, "950000\n");
+  tree.write("/proc/sys/kernel/sched_rt_period_us", "1000000\n");
+  tree.write("/sys/devices/system/cpu/isolated", "2\n");
+  EXPECT_EQ(tree.look("throttling").level, FindingLevel::note) << "core 3 is for all programs";
+  tree.write("/sys/devices/system/cpu/isolated", "2-3\n");
+  EXPECT_EQ(tree.look("throttling").level, FindingLevel::ok);
+  EXPECT_THAT(tree.look("throttling").advice, HasSubstr("keep the load"));
+  tree.write(run_time, "940000\n");
+  EXPECT_EQ(tree.look("throttling").level, FindingLevel::note);
+}
+
 TEST(HostCheckKernel, TellsTheTimerSlack) {
   const FakeTree tree;
   EXPECT_THAT(tree.look("timer_slack").found, StartsWith("not known: "));

@@ -50,6 +50,13 @@ TEST(HostCheckPower, WarnsOfAGovernorThatSlowsDown) {
   EXPECT_EQ(tree.look("governor").level, FindingLevel::ok);
 }
 
+TEST(HostCheckPower, NeedsNoGovernorWhereTheKernelChangesNoFrequency) {
+  const FakeTree tree;
+  tree.make_folder("/sys/devices/system/cpu/cpu2");
+  EXPECT_EQ(tree.look("governor").level, FindingLevel::ok);
+  EXPECT_EQ(tree.look("governor").found, "the kernel changes no frequency");
+}
+
 TEST(HostCheckMemory, NotesSwap) {
   const FakeTree tree;
   EXPECT_THAT(tree.look("swap").found, StartsWith("not known: "));
