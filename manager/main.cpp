@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -5,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +16,7 @@
 #include "api/security/identity.hpp"
 #include "manager/config/config_changes.hpp"
 #include "manager/config/load_config.hpp"
+#include "manager/fix_host.hpp"
 #include "manager/manager.hpp"
 #include "manager/store/store_application.hpp"
 #include "manager/store/store_process.hpp"
@@ -37,11 +41,19 @@ struct Options {
   std::string check_config;
   std::string log_level;
   std::string programs;
+  std::string fix_host;
+  std::string root;
 };
+
+constexpr std::array kFixWords = {std::pair{std::string_view("print"), FixMode::print},
+                                  std::pair{std::string_view("apply"), FixMode::apply},
+                                  std::pair{std::string_view("revert"), FixMode::revert}};
 
 void describe(CLI::App& app, Options& options) {
   app.set_version_flag("--version", PLCHOST_VERSION);
-  auto* config = app.add_option("--config", options.config, "Run with this configuration file");
+  auto* config = app.add_option(
+      "--config", options.config,
+      "Run with this configuration file; with --fix-host it may be left out: /etc/plchost/plchost.toml");
   auto* check = app.add_option("--check-config", options.check_config,
                                "Only check this configuration file, and all that a start needs");
   config->excludes(check);
@@ -50,6 +62,16 @@ void describe(CLI::App& app, Options& options) {
       ->check(CLI::IsMember(std::vector<std::string>(kLogLevels.begin(), kLogLevels.end())));
   app.add_option("--programs", options.programs,
                  "Folder of plc-instance and plchost-dds; default: that of plchostd");
+  auto* fix = app.add_option("--fix-host", options.fix_host,
+                             "Set this host up for the cores of its instances, and end: print the files that "
+                             "do it, apply or revert them. 'plcctl check host --fix' calls this")
+                  ->check(CLI::IsMember({"print", "apply", "revert"}))
+                  ->type_name("WORD");
+  fix->excludes(check);
+  app.add_option("--root", options.root,
+                 "With --fix-host: the folder of an image, where files are written and nothing is run")
+      ->check(CLI::ExistingDirectory)
+      ->needs(fix);
   std::string footer =
       "A changed key of the configuration, after 'systemctl reload', SIGHUP or 'plcctl reload host':\n";
   for (const std::string& row : key_table()) footer += fmt::format("  {}\n", row);
@@ -96,6 +118,30 @@ std::expected<ManagerConfig, ConfigErrors> read_config(const Options& options) {
   return config;
 }
 
+// Only the cores count: a host can be set up before its applications are there. The cores that are isolated
+// now may be those of an earlier configuration.
+int fix(Options options) {
+  while (options.root.ends_with('/')) options.root.pop_back();
+  const auto* const word =
+      std::ranges::find(kFixWords, options.fix_host, [](const auto& one) { return one.first; });
+  const FixOrder order{.mode = word->second, .root = options.root};
+  if (const auto may = may_fix_host(order); !may) {
+    fmt::print(stderr, "plchostd: {}\n", may.error().describe());
+    return kExitFailed;
+  }
+  if (order.mode == FixMode::revert) return fix_host(order, {}) ? kExitDone : kExitFailed;
+  if (options.config.empty()) options.config = options.root + "/etc/plchost/plchost.toml";
+  auto surroundings = config_surroundings();
+  const auto online = facts_below(options.root).cores("/sys/devices/system/cpu/online");
+  if (online && !online->empty()) surroundings.online_cores = *online;
+  surroundings.isolated_cores.clear();
+  surroundings.check_files = false;
+  const auto config = load_config(options.config, surroundings);
+  if (config) return fix_host(order, *config) ? kExitDone : kExitFailed;
+  for (const std::string& error : config.error()) fmt::print(stderr, "{}\n", error);
+  return kExitFailed;
+}
+
 int run(const Options& options) {
   const auto config = read_config(options);
   if (!config) {
@@ -132,8 +178,8 @@ int plchostd_main(int argc, const char* const* argv) {
   describe(app, options);
   try {
     app.parse(argc, argv);
-    if (options.config.empty() && options.check_config.empty()) {
-      throw CLI::RequiredError("--config FILE or --check-config FILE");
+    if (options.config.empty() && options.check_config.empty() && options.fix_host.empty()) {
+      throw CLI::RequiredError("--config FILE, --check-config FILE or --fix-host WORD");
     }
   } catch (const CLI::ParseError& error) {
     const std::vector<std::string> words(arguments.begin() + 1, arguments.end());
@@ -146,6 +192,7 @@ int plchostd_main(int argc, const char* const* argv) {
     }
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
   }
+  if (!options.fix_host.empty()) return fix(options);
   return options.config.empty() ? check_only(options.check_config, programs_of(options)) : run(options);
 }
 

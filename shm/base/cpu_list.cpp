@@ -28,6 +28,8 @@ bool take(std::string_view& text, char wanted) {
   return true;
 }
 
+constexpr int kWordBits = 32;  // of a mask
+
 bool is_core(int number) {
   return number >= 0 && number <= kMaxCoreNumber;
 }
@@ -48,7 +50,6 @@ std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
 }
 
 std::optional<std::vector<int>> parse_cpu_mask(std::string_view text) {
-  constexpr int kWordBits = 32;
   std::vector<std::uint32_t> words;
   do {
     const auto word = take_number<std::uint32_t>(text, 16);
@@ -75,6 +76,15 @@ std::string format_cpu_list(const std::vector<int>& sorted) {
     text += last == i ? fmt::format("{}", sorted[i]) : fmt::format("{}-{}", sorted[i], sorted[last]);
     i = last + 1;
   }
+  return text;
+}
+
+std::string format_cpu_mask(const std::vector<int>& sorted) {
+  std::vector<std::uint32_t> words(sorted.empty() ? 1
+                                                  : static_cast<std::size_t>(sorted.back() / kWordBits + 1));
+  for (const int core : sorted) words[static_cast<std::size_t>(core / kWordBits)] |= 1U << core % kWordBits;
+  std::string text = fmt::format("{:x}", words.back());
+  for (std::size_t i = words.size() - 1; i-- > 0;) text += fmt::format(",{:08x}", words[i]);
   return text;
 }
 

@@ -19,6 +19,8 @@ inline constexpr int kMaxCoreNumber = 8191;
 
 /// Back to the first form.
 [[nodiscard]] std::string format_cpu_list(const std::vector<int>& sorted);
+/// Back to the other form.
+[[nodiscard]] std::string format_cpu_mask(const std::vector<int>& sorted);
 
 /// Sorted, each once.
 [[nodiscard]] std::vector<int> each_once(std::vector<int> cores);

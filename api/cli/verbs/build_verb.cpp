@@ -8,17 +8,13 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/interrupt.hpp"
+#include "api/cli/own_folder.hpp"
 #include "instances/adapters/build_application.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
-
-std::filesystem::path own_folder() {
-  std::error_code error;
-  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
-}
 
 // A compiler's output has several lines.
 void tell(const std::string& text) {

@@ -1,12 +1,16 @@
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <code_words.hpp>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/own_folder.hpp"
 #include "api/cli/rows/status_rows.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/field_info.hpp"
@@ -64,14 +68,60 @@ int check_host(CliSession& session, bool all) {
   return worst == kWarning ? kExitWarnings : kExitDone;
 }
 
+struct CheckOrder {
+  bool all = false;
+  bool fix = false;
+  bool apply = false;
+  bool revert = false;
+  std::string config;
+  std::string root;
+};
+
+int wrong_use(std::string_view text) {
+  fmt::print(stderr, "plcctl: {}\n", text);
+  return kExitUsage;
+}
+
+// The plan is made, and its files are written, by the program that has the checks. It works before a manager
+// runs, and none of this can be asked for over the network.
+int fix_host(const CliOptions& options, const CheckOrder& order) {
+  if (order.apply && order.revert) return wrong_use("--apply and --revert exclude each other");
+  if (!options.hosts.host.empty() || !options.hosts.labels.empty())
+    return wrong_use("--fix is about this machine, without --host and --label: run it on the controller");
+  if (options.json || options.csv || order.all) return wrong_use("--fix prints text only, without --all");
+  const std::string program = own_folder() / "plchostd";
+  const char* const mode = order.apply ? "apply" : order.revert ? "revert" : "print";
+  std::vector<const char*> words = {program.c_str(), "--fix-host", mode};
+  if (!order.config.empty()) words.insert(words.end(), {"--config", order.config.c_str()});
+  if (!order.root.empty()) words.insert(words.end(), {"--root", order.root.c_str()});
+  words.push_back(nullptr);
+  ::execv(program.c_str(), const_cast<char* const*>(words.data()));
+  return CliSession::fail({ErrorCode::system, errno, "--fix works on a controller only: " + program});
+}
+
+int check(CliSession& session, const CheckOrder& order) {
+  if (order.fix) return fix_host(session.options, order);
+  if (order.apply || order.revert || !order.config.empty() || !order.root.empty())
+    return wrong_use("--apply, --revert, --config and --root need --fix");
+  return check_host(session, order.all);
+}
+
 }  // namespace
 
 void add_check_verb(const Command& plcctl, CliSession& session) {
-  const auto all = std::make_shared<bool>(false);
+  const auto order = std::make_shared<CheckOrder>();
   plcctl.verb("check", "Look for obstacles to the real-time behaviour of a controller")
-      .noun("host", "The changes that the controller needs, the worst first",
-            [&session, all] { return check_host(session, *all); })
-      .flag("--all", *all, "also the checks that found nothing to change");
+      .noun("host",
+            "The changes that the controller needs, the worst first; with --fix the files that make them",
+            [&session, order] { return check(session, *order); })
+      .flag("--all", order->all, "also the checks that found nothing to change")
+      .flag("--fix", order->fix,
+            "on the controller itself: print the files in /etc that make the changes, from its configuration")
+      .flag("--apply", order->apply, "with --fix: write these files, and run what they need (as root)")
+      .flag("--revert", order->revert, "with --fix: remove these files (as root)")
+      .option("--config", order->config,
+              "with --fix: the configuration of the manager (else /etc/plchost/plchost.toml)", "")
+      .option("--root", order->root, "with --fix: the folder of an image, where nothing is run", "");
 }
 
 }  // namespace plchost

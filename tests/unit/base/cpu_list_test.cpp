@@ -37,5 +37,12 @@ TEST(CpuMask, IsReadInWordsTheHighestFirst) {
   EXPECT_FALSE(parse_cpu_mask(endless));
 }
 
+TEST(CpuMask, IsWrittenInWordsTheHighestFirst) {
+  EXPECT_EQ(format_cpu_mask({}), "0");
+  EXPECT_EQ(format_cpu_mask({0, 2}), "5");
+  EXPECT_EQ(format_cpu_mask({31, 32}), "1,80000000");
+  EXPECT_EQ(format_cpu_mask({64}), "1,00000000,00000000");
+}
+
 }  // namespace
 }  // namespace plchost

@@ -1,0 +1,287 @@
+#include "manager/fix_host.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <sstream>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include "manager/host_check/checks.hpp"
+#include "manager/host_check/host_plan.hpp"
+#include "manager/host_check/plan_files.hpp"
+#include "manager/system/child_process.hpp"
+#include "shm/base/cpu_list.hpp"
+
+namespace plchost {
+
+namespace {
+
+using State = PlanFiles::State;
+
+// Nothing of the caller's environment: root runs these.
+constexpr auto kPath = "/usr/sbin:/usr/bin:/sbin:/bin";
+constexpr std::array kProgramFolders = {"/usr/sbin/", "/usr/bin/", "/sbin/", "/bin/"};
+constexpr std::array kContainerMarks = {"/run/systemd/container", "/run/.containerenv", "/.dockerenv"};
+
+using Words = std::vector<std::string>;
+
+bool fail(const std::string& text) {
+  (void)std::fflush(stdout);
+  fmt::print(stderr, "plchostd: {}\n", text);
+  return false;
+}
+
+std::optional<std::string> program_path(const std::string& name) {
+  for (const char* const folder : kProgramFolders) {
+    if (const std::string path = folder + name; ::access(path.c_str(), X_OK) == 0) return path;
+  }
+  return std::nullopt;
+}
+
+bool needs_systemd(const Words& command) {
+  return command.front() == "systemctl" || command.front() == "udevadm";
+}
+
+Result<ExitStatus> run(Words command, const std::string& path) {
+  command.front() = path;
+  PLCHOST_TRY_ASSIGN(const auto child, spawn_process({.arguments = command}));
+  pollfd end{.fd = child.pidfd.get(), .events = POLLIN, .revents = 0};
+  while (::poll(&end, 1, -1) < 0 && errno == EINTR) {
+  }
+  return reap_process(child);
+}
+
+// True: none of them has failed. One that is not here has nothing to do.
+bool run_all(const std::vector<Words>& commands) {
+  ::setenv("PATH", kPath, 1);
+  const bool systemd = HostFiles().exists("/run/systemd/system");
+  bool good = true;
+  for (const Words& command : commands) {
+    const std::string shown = fmt::format("{}", fmt::join(command, " "));
+    const auto path = program_path(command.front());
+    if (!path || (needs_systemd(command) && !systemd)) {
+      fmt::print("not run: {}: {}\n", shown, path ? "systemd does not run" : "there is no such program");
+      continue;
+    }
+    (void)std::fflush(stdout);
+    const auto ended = run(command, *path);
+    if (ended && ended->success()) {
+      fmt::print("ran: {}\n", shown);
+    } else {
+      good = fail(fmt::format("{}: {}", shown, ended ? ended->describe() : ended.error().describe()));
+    }
+  }
+  return good;
+}
+
+std::vector<Words> commands_to_apply(const PlanFacts& facts) {
+  std::vector<Words> commands = {{"sysctl", "-q", "-p", place_of(PlanPart::sysctl).path},
+                                 {"udevadm", "control", "--reload"},
+                                 {"systemctl", "daemon-reload"},
+                                 {"systemctl", "restart", kPlanUnit},
+                                 {"systemctl", "try-restart", "irqbalance.service"}};
+  if (facts.has_grub) commands.push_back({"update-grub"});
+  return commands;
+}
+
+void print_commands(const std::vector<Words>& commands, std::string_view when) {
+  for (const Words& command : commands) fmt::print("{}: {}\n", when, fmt::join(command, " "));
+}
+
+void print_text(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) fmt::print("    {}\n", line);
+}
+
+// Each finding that is not good: the files that mend it, or the reason that none does.
+void print_fixes(const CheckedHost& host, bool has_grub) {
+  std::string of_manager;
+  for (const HostFinding& finding : check_host(host)) {
+    const auto* const fix = std::ranges::find(host_fixes(), finding.id, &Fix::check).operator->();
+    if (fix->of_manager) of_manager += (of_manager.empty() ? "" : ", ") + finding.id;
+    if (fix->of_manager || finding.level == FindingLevel::ok) continue;
+    std::string by;
+    for (const std::string_view path : fix->by) {
+      if (path.empty()) continue;
+      const bool by_hand = path == place_of(PlanPart::grub).path && !has_grub;
+      by += fmt::format("{}{}", by.empty() ? "" : " and ", by_hand ? "the command line of the kernel" : path);
+    }
+    fmt::print("{:<19} {}: {}\n", finding.id, by.empty() ? "no file of plchost changes it" : by, fix->text);
+  }
+  fmt::print("not looked at: {}: plchostd.service gives the manager its rights, see 'plcctl check host'\n",
+             of_manager);
+}
+
+// The first reason for which nothing may be written.
+Result<std::vector<State>> look(const PlanFiles& files, const HostPlan& plan, const HostFiles& written,
+                                const std::string& root) {
+  std::vector<State> states;
+  for (const PlannedFile& file : plan.files) {
+    PLCHOST_TRY_ASSIGN(const auto state, files.state(file));
+    states.push_back(state);
+  }
+  if (plan.files.front().part != PlanPart::grub) return states;
+  std::vector<std::string> others = {"/etc/default/grub"};
+  for (const std::string& name : written.names("/etc/default/grub.d").value_or(std::vector<std::string>())) {
+    const std::string path = "/etc/default/grub.d/" + name;
+    if (path.ends_with(".cfg") && path != place_of(PlanPart::grub).path) others.push_back(path);
+  }
+  for (const std::string& path : others) {
+    const auto words = words_that_clash(written.text(path).value_or(""));
+    if (words.empty()) continue;
+    return failure(ErrorCode::refused,
+                   fmt::format("{}{} has {} too, and the kernel would not take both; take it out there", root,
+                               path, fmt::join(words, " ")));
+  }
+  return states;
+}
+
+std::string_view word_of(State state) {
+  if (state == State::same) return "is there";
+  return state == State::missing ? "new" : "changed";
+}
+
+bool runs_with(const std::string& words) {
+  const std::string line = " " + HostFiles().text("/proc/cmdline").value_or("") + " ";
+  std::istringstream each(words);
+  for (std::string word; each >> word;) {
+    if (line.find(" " + word + " ") == std::string::npos) return false;
+  }
+  return true;
+}
+
+void print_kernel_words(const HostPlan& plan, const FixOrder& order, bool has_grub) {
+  if (!has_grub)
+    fmt::print("by hand: there is no grub: let the boot loader give the kernel: {}\n", plan.kernel_words);
+  if (order.root.empty() && runs_with(plan.kernel_words)) {
+    fmt::print("the kernel runs with these words: {}\n", plan.kernel_words);
+  } else {
+    fmt::print("{}: {}\n", order.root.empty() ? "with a reboot" : "at the boot of the image",
+               plan.kernel_words);
+  }
+}
+
+bool apply(const FixOrder& order, const HostPlan& plan, const std::vector<State>& states,
+           const PlanFacts& facts) {
+  const PlanFiles files(order.root);
+  for (std::size_t i = 0; i < plan.files.size(); ++i) {
+    const std::string path = order.root + place_of(plan.files[i].part).path;
+    if (states[i] != State::same) {
+      if (const auto written = files.write(plan.files[i]); !written)
+        return fail(written.error().describe() + "; the files above are written, --apply goes on there");
+    }
+    fmt::print("{}: {}\n", states[i] == State::same ? "is there" : "written", path);
+  }
+  const auto commands = commands_to_apply(facts);
+  bool good = true;
+  if (order.root.empty()) {
+    good = run_all(commands);
+  } else {
+    print_commands(commands, "to run in it");
+  }
+  print_kernel_words(plan, order, facts.has_grub);
+  return good;
+}
+
+bool revert(const FixOrder& order) {
+  const PlanFiles files(order.root);
+  bool good = true;
+  bool unit = false;
+  bool grub = false;
+  bool any = false;
+  for (std::size_t i = kPlanPlaces.size(); i-- > 0;) {
+    const auto part = static_cast<PlanPart>(i);
+    const auto removed = files.remove(part);
+    if (!removed) good = fail("left as it is: " + removed.error().describe());
+    if (!removed || !*removed) continue;
+    fmt::print("removed: {}{}\n", order.root, kPlanPlaces[i].path);
+    any = true;
+    unit = unit || part == PlanPart::unit;
+    grub = grub || part == PlanPart::grub;
+  }
+  if (!any) {
+    fmt::print("plchost has no file here\n");
+    return good;
+  }
+  std::vector<Words> commands;
+  if (unit) commands.push_back({"systemctl", "stop", kPlanUnit});
+  commands.push_back({"systemctl", "daemon-reload"});
+  commands.push_back({"systemctl", "try-restart", "irqbalance.service"});
+  commands.push_back({"udevadm", "control", "--reload"});
+  if (grub) commands.push_back({"update-grub"});
+  if (order.root.empty()) {
+    good = run_all(commands) && good;
+  } else {
+    print_commands(commands, "to run in it");
+  }
+  fmt::print(
+      "with a reboot: the command line of the kernel, sysctl, interrupts, work queues, huge pages and "
+      "governors are as they were; until then all of them stay\n");
+  return good;
+}
+
+std::string container_mark(const HostFiles& files) {
+  for (const char* const mark : kContainerMarks) {
+    if (files.exists(mark)) return mark;
+  }
+  return {};
+}
+
+}  // namespace
+
+HostFiles facts_below(const std::string& root) {
+  return HostFiles(HostFiles(root).exists("/sys/devices/system/cpu/online") ? root : std::string());
+}
+
+Result<void> may_fix_host(const FixOrder& order) {
+  if (order.mode == FixMode::print || !order.root.empty() || ::geteuid() == 0) return {};
+  return failure(ErrorCode::refused, "only root may write in /etc: run it as root, or with sudo");
+}
+
+bool fix_host(const FixOrder& order, const ManagerConfig& config) {
+  const bool writes = order.mode != FixMode::print;
+  const HostFiles written(order.root);
+  if (order.mode == FixMode::revert) return revert(order);
+  const std::string mark = container_mark(written);
+  if (writes && !mark.empty()) {
+    return fail(fmt::format("{}{} says that this is a container: its kernel is set up outside, on the host",
+                            order.root, mark));
+  }
+  CheckedHost host = this_host(config);
+  host.files = facts_below(order.root);
+  const auto facts = plan_facts(host, written);
+  if (!facts) return fail(facts.error().describe());
+  const auto plan = plan_host(*facts);
+  if (!plan) return fail(plan.error().describe());
+  const PlanFiles files(order.root);
+  const auto states = look(files, *plan, written, order.root);
+  fmt::print("{}; cores {} for all the rest\n", host_check::name_cores(host, host_check::plc_cores(host)),
+             format_cpu_list(plan->housekeeping));
+  if (!states) return fail(states.error().describe());
+  if (writes) return apply(order, *plan, *states, *facts);
+  for (std::size_t i = 0; i < plan->files.size(); ++i) {
+    const PlannedFile& file = plan->files[i];
+    fmt::print("{}: {}{}\n", word_of((*states)[i]), order.root, place_of(file.part).path);
+    if ((*states)[i] != State::same) print_text(file.text);
+  }
+  print_fixes(host, facts->has_grub);
+  print_commands(commands_to_apply(*facts), "to run");
+  print_kernel_words(*plan, order, facts->has_grub);
+  if (!mark.empty()) {
+    fmt::print("{}{} says that this is a container: all of this has to be done outside, on the host\n",
+               order.root, mark);
+  } else if (order.root.empty() && ::geteuid() != 0) {
+    fmt::print("--apply does it, and needs root\n");
+  }
+  return true;
+}
+
+}  // namespace plchost
