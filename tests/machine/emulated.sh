@@ -26,25 +26,37 @@ works_with() {
 }
 
 machine_start() {
-  local accelerator=tcg,thread=multi
+  accelerator=tcg,thread=multi
   if [ -w /dev/kvm ] && works_with kvm 2>/dev/null; then
     accelerator=kvm
     machine_is_emulated=no
   fi
   port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
   machine_prepare
-  qemu-system-x86_64 -accel "$accelerator" -cpu max -smp 2 -m 2048 -display none -monitor none -serial "file:$work/console" -no-reboot \
-    -kernel "$root/vmlinuz" -initrd "$root/initrd.img" -append "root=/dev/vda rw console=ttyS0 panic=-1 $kernel_line" \
-    -drive "file=$work/disk,format=raw,if=virtio,snapshot=on" \
-    -nic "user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:$port-:22" >"$work/qemu" 2>&1 </dev/null &
-  machine=$!
-  echo "  QEMU with $accelerator, $kernel${kernel_line:+ $kernel_line}"
-  until_true 900 answers  # an emulated machine beside busy ones
+  machine_boot
   # 20 times slower than a processor, it would do nothing but ticks.
   [ "$machine_is_emulated" = no ] || sed -i 's/^SchedulerInterval=.*/SchedulerInterval=20000/' "$applications"/*.cfg
   tar -C "$packages" -c . | ssh_machine 'mkdir /packages && tar -C /packages -x'
   tar -C "$applications" -c . | ssh_machine 'mkdir /applications && tar -C /applications -x'
 }
+# With one queue for the disk: the interrupt of a queue that only one core has cannot be moved.
+machine_boot() {
+  qemu-system-x86_64 -accel "$accelerator" -cpu max -smp 2 -m 2048 -display none -monitor none -serial "file:$work/console" -no-reboot \
+    -kernel "$root/vmlinuz" -initrd "$root/initrd.img" -append "root=/dev/vda rw console=ttyS0 panic=-1 $kernel_line" \
+    -drive "file=$work/disk,format=raw,if=none,id=disk,cache=unsafe" -device virtio-blk-pci,drive=disk,num-queues=1 \
+    -nic "user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:$port-:22" >"$work/qemu" 2>&1 </dev/null &
+  machine=$!
+  echo "  QEMU with $accelerator, $kernel${kernel_line:+ $kernel_line}"
+  until_true 900 answers  # an emulated machine beside busy ones
+}
+# The same machine after an end in order, with $kernel_line as it is now.
+machine_boot_again() {
+  on_machine systemctl poweroff || true
+  until_true 600 has_ended
+  rm -f "$work/ssh"
+  machine_boot
+}
+has_ended() { ! kill -0 "$machine"; }
 answers() {
   kill -0 "$machine" 2>/dev/null || cannot "QEMU ended: $(tail -n 1 "$work/qemu")"
   ssh_machine true </dev/null
