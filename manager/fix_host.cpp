@@ -159,10 +159,10 @@ bool runs_with(const std::string& words) {
 }
 
 void print_kernel_words(const HostPlan& plan, const FixOrder& order, bool has_grub) {
-  if (!has_grub)
-    fmt::print("by hand: there is no grub: let the boot loader give the kernel: {}\n", plan.kernel_words);
   if (order.root.empty() && runs_with(plan.kernel_words)) {
     fmt::print("the kernel runs with these words: {}\n", plan.kernel_words);
+  } else if (!has_grub) {
+    fmt::print("by hand: there is no grub: let the boot loader give the kernel: {}\n", plan.kernel_words);
   } else {
     fmt::print("{}: {}\n", order.root.empty() ? "with a reboot" : "at the boot of the image",
                plan.kernel_words);

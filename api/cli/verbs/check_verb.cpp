@@ -87,7 +87,8 @@ int wrong_use(std::string_view text) {
 int fix_host(const CliOptions& options, const CheckOrder& order) {
   if (order.apply && order.revert) return wrong_use("--apply and --revert exclude each other");
   if (!options.hosts.host.empty() || !options.hosts.labels.empty())
-    return wrong_use("--fix is about this machine, without --host and --label: run it on the controller");
+    return wrong_use(
+        "--fix is about this machine: run it on the controller, without --host, --label and PLCHOST_HOST");
   if (options.json || options.csv || order.all) return wrong_use("--fix prints text only, without --all");
   const std::string program = own_folder() / "plchostd";
   const char* const mode = order.apply ? "apply" : order.revert ? "revert" : "print";
