@@ -40,6 +40,7 @@ bool fail(const std::string& text) {
 }
 
 std::optional<std::string> program_path(const std::string& name) {
+  if (name.starts_with('/')) return HostFiles().exists(name) ? std::optional(name) : std::nullopt;
   for (const char* const folder : kProgramFolders) {
     if (const std::string path = folder + name; ::access(path.c_str(), X_OK) == 0) return path;
   }
@@ -82,12 +83,19 @@ bool run_all(const std::vector<Words>& commands) {
   return good;
 }
 
-std::vector<Words> commands_to_apply(const PlanFacts& facts) {
-  std::vector<Words> commands = {{"sysctl", "-q", "-p", place_of(PlanPart::sysctl).path},
-                                 {"udevadm", "control", "--reload"},
-                                 {"systemctl", "daemon-reload"},
-                                 {"systemctl", "restart", kPlanUnit},
-                                 {"systemctl", "try-restart", "irqbalance.service"}};
+// To apply and to revert: rules, units, and irqbalance where it is installed.
+std::vector<Words> commands_to_reload(const HostFiles& written) {
+  std::vector<Words> commands = {{"udevadm", "control", "--reload"}, {"systemctl", "daemon-reload"}};
+  if (written.exists("/lib/systemd/system/irqbalance.service"))
+    commands.push_back({"systemctl", "try-restart", "irqbalance.service"});
+  return commands;
+}
+
+// The program of systemd, as sysctl fails for each setting that the kernel does not have.
+std::vector<Words> commands_to_apply(const PlanFacts& facts, const HostFiles& written) {
+  auto commands = commands_to_reload(written);
+  commands.push_back({"systemctl", "restart", kPlanUnit});
+  commands.push_back({"/lib/systemd/systemd-sysctl", place_of(PlanPart::sysctl).path});
   if (facts.has_grub) commands.push_back({"update-grub"});
   return commands;
 }
@@ -180,7 +188,7 @@ bool apply(const FixOrder& order, const HostPlan& plan, const std::vector<State>
     }
     fmt::print("{}: {}\n", states[i] == State::same ? "is there" : "written", path);
   }
-  const auto commands = commands_to_apply(facts);
+  const auto commands = commands_to_apply(facts, HostFiles(order.root));
   bool good = true;
   if (order.root.empty()) {
     good = run_all(commands);
@@ -194,9 +202,12 @@ bool apply(const FixOrder& order, const HostPlan& plan, const std::vector<State>
 bool revert(const FixOrder& order) {
   const PlanFiles files(order.root);
   bool good = true;
-  bool unit = false;
   bool grub = false;
   bool any = false;
+  // As long as it has its file: it may not be loaded yet.
+  const auto unit = files.state({PlanPart::unit, {}});
+  if (unit && *unit != State::missing && order.root.empty())
+    good = run_all({{"systemctl", "stop", kPlanUnit}});
   for (std::size_t i = kPlanPlaces.size(); i-- > 0;) {
     const auto part = static_cast<PlanPart>(i);
     const auto removed = files.remove(part);
@@ -204,18 +215,13 @@ bool revert(const FixOrder& order) {
     if (!removed || !*removed) continue;
     fmt::print("removed: {}{}\n", order.root, kPlanPlaces[i].path);
     any = true;
-    unit = unit || part == PlanPart::unit;
     grub = grub || part == PlanPart::grub;
   }
   if (!any) {
     fmt::print("plchost has no file here\n");
     return good;
   }
-  std::vector<Words> commands;
-  if (unit) commands.push_back({"systemctl", "stop", kPlanUnit});
-  commands.push_back({"systemctl", "daemon-reload"});
-  commands.push_back({"systemctl", "try-restart", "irqbalance.service"});
-  commands.push_back({"udevadm", "control", "--reload"});
+  auto commands = commands_to_reload(HostFiles(order.root));
   if (grub) commands.push_back({"update-grub"});
   if (order.root.empty()) {
     good = run_all(commands) && good;
@@ -273,7 +279,7 @@ bool fix_host(const FixOrder& order, const ManagerConfig& config) {
     if ((*states)[i] != State::same) print_text(file.text);
   }
   print_fixes(host, facts->has_grub);
-  print_commands(commands_to_apply(*facts), "to run");
+  print_commands(commands_to_apply(*facts, written), "to run");
   print_kernel_words(*plan, order, facts->has_grub);
   if (!mark.empty()) {
     fmt::print("{}{} says that this is a container: all of this has to be done outside, on the host\n",

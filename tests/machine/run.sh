@@ -203,10 +203,14 @@ if [ "$kernel" = linux-image-rt-amd64 ]; then
   first=$(findings)
   [[ $first == *isolated_cores* ]] || fail "the core is isolated already: $first"
   on_machine plcctl check host --fix --apply >"$work/applied" 2>"$log" || fail "--apply: $(cat "$work/applied")"
-  for command in update-grub "systemctl restart plchost-tuning.service" "sysctl -q -p /etc/sysctl.d/60-plchost.conf"; do
+  for command in update-grub "systemctl restart plchost-tuning.service" "/lib/systemd/systemd-sysctl /etc/sysctl.d/60-plchost.conf"; do
     grep -qxF "ran: $command" "$work/applied" || fail "not run: $command: $(cat "$work/applied")"
   done
-  on_machine plcctl check host --fix --apply >"$work/applied" 2>"$log" || fail "the second --apply"
+  on_machine plcctl check host --fix --revert >"$work/applied" 2>"$log" || fail "--revert: $(cat "$work/applied")"
+  [ "$(grep -c '^removed' "$work/applied")" = 6 ] || fail "--revert: $(cat "$work/applied")"
+  ! on_machine grep -q isolcpus /boot/grub/grub.cfg || fail "grub does not know of --revert"
+  on_machine plcctl check host --fix --apply >"$work/applied" 2>"$log" || fail "--apply after --revert: $(cat "$work/applied")"
+  on_machine plcctl check host --fix --apply >"$work/applied" 2>"$log" || fail "the second --apply: $(cat "$work/applied")"
   ! grep '^written' "$work/applied" || fail "the second --apply has written"
   # Of the first entry, as grub would start it.
   kernel_line=$(on_machine sed -nE 's/^\s*linux\s+\S+ (.*)/\1/p' /boot/grub/grub.cfg | sed -n '1s/ro\b *//p')

@@ -47,6 +47,11 @@ grep -q '^not looked at: .*memory_lock' <<<"$plan" || fail "no reasons: $plan"
 applied=$(fix --apply)
 for file in "${files[@]}"; do grep -qxF "written: $image$file" <<<"$applied" || fail "not written: $file: $applied"; done
 grep -qx 'to run in it: update-grub' <<<"$applied" || fail "nothing is to be run: $applied"
+! grep -q 'try-restart irqbalance' <<<"$applied" || fail "irqbalance is not there, and would be started anew"
+mkdir -p "$image/lib/systemd/system"
+touch "$image/lib/systemd/system/irqbalance.service"
+grep -qx 'to run: systemctl try-restart irqbalance.service' < <(fix) || fail "irqbalance would go on with all cores"
+rm -r "$image/lib"
 is "$(kernel_line)" "quiet splash $words" || fail "the command line of the kernel: $(kernel_line)"
 while read -r line; do
   grep -qxF "    $line" <<<"$plan" || fail "was not in the plan: $line"
