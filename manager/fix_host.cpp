@@ -113,16 +113,16 @@ void print_text(const std::string& text) {
 void print_fixes(const CheckedHost& host, bool has_grub) {
   std::string of_manager;
   for (const HostFinding& finding : check_host(host)) {
-    const auto* const fix = std::ranges::find(host_fixes(), finding.id, &Fix::check).operator->();
-    if (fix->of_manager) of_manager += (of_manager.empty() ? "" : ", ") + finding.id;
-    if (fix->of_manager || finding.level == FindingLevel::ok) continue;
+    const Fix& fix = *std::ranges::find(host_fixes(), finding.id, &Fix::check);  // each has one
+    if (fix.of_manager) of_manager += (of_manager.empty() ? "" : ", ") + finding.id;
+    if (fix.of_manager || finding.level == FindingLevel::ok) continue;
     std::string by;
-    for (const std::string_view path : fix->by) {
+    for (const std::string_view path : fix.by) {
       if (path.empty()) continue;
       const bool by_hand = path == place_of(PlanPart::grub).path && !has_grub;
       by += fmt::format("{}{}", by.empty() ? "" : " and ", by_hand ? "the command line of the kernel" : path);
     }
-    fmt::print("{:<19} {}: {}\n", finding.id, by.empty() ? "no file of plchost changes it" : by, fix->text);
+    fmt::print("{:<19} {}: {}\n", finding.id, by.empty() ? "no file of plchost changes it" : by, fix.text);
   }
   fmt::print("not looked at: {}: plchostd.service gives the manager its rights, see 'plcctl check host'\n",
              of_manager);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <utility>
 
 #include "manager/host_check/host_plan.hpp"
 #include "shm/base/result.hpp"
