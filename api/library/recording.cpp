@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include "api/client/variable_recording.hpp"
 #include "api/library/calls.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/variables.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
+#include "api/recording/variable_recording.hpp"
 
 namespace plchost {
 

@@ -9,12 +9,12 @@
 #include <fmt/format.h>
 
 #include "api/client/client_core_status.hpp"
-#include "api/client/variable_recording.hpp"
 #include "api/dds/page_sample.hpp"
 #include "api/dds/text.hpp"
 #include "api/library/calls.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/worker.hpp"
+#include "api/recording/variable_recording.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

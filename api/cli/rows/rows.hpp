@@ -7,7 +7,7 @@
 #include <control.h>
 
 #include "api/cli/rows/table.hpp"
-#include "api/client/csv_text.hpp"
+#include "api/recording/csv_text.hpp"
 
 namespace plchost {
 

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "api/client/csv_text.hpp"
+#include "api/recording/csv_text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

@@ -11,7 +11,7 @@
 #include "api/cli/interrupt.hpp"
 #include "api/cli/output.hpp"
 #include "api/cli/rows/log_rows.hpp"
-#include "api/client/variable_recording.hpp"
+#include "api/recording/variable_recording.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "api/cli/verbs/variable_sampler.hpp"
-#include "api/client/variable_recording.hpp"
+#include "api/recording/variable_recording.hpp"
 
 namespace plchost {
 

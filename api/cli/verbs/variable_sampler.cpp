@@ -4,8 +4,8 @@
 #include <iterator>
 #include <utility>
 
-#include "api/client/variable_recording.hpp"
 #include "api/dds/page_sample.hpp"
+#include "api/recording/variable_recording.hpp"
 
 namespace plchost {
 

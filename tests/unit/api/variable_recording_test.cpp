@@ -1,5 +1,5 @@
 // Recordings of variables: when their samples are taken, and their text.
-#include "api/client/variable_recording.hpp"
+#include "api/recording/variable_recording.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -9,8 +9,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include "tests/support/own_name.hpp"
 #include "tests/unit/api/debugged_instance.hpp"
 
 namespace plchost {
@@ -123,7 +123,7 @@ TEST(Recording, NamesTheVariablesOnceAndEndsWhenThereAreOthers) {
 }
 
 TEST(Recording, ReplacesAnEarlierOneWithItsFirstSample) {
-  const auto folder = std::filesystem::temp_directory_path() / ("recording-" + std::to_string(::getpid()));
+  const auto folder = own_path("recording");
   std::filesystem::create_directory(folder);
   const auto path = folder / "record.csv";
   const auto contents = [&] {

@@ -1,4 +1,4 @@
-#include "api/client/variable_recording.hpp"
+#include "api/recording/variable_recording.hpp"
 
 #include <cerrno>
 #include <utility>
@@ -8,8 +8,8 @@
 #include <stdio_ext.h>
 #include <unistd.h>
 
-#include "api/client/csv_text.hpp"
 #include "api/dds/text.hpp"
+#include "api/recording/csv_text.hpp"
 #include "shm/base/next_on_grid.hpp"
 
 namespace plchost {

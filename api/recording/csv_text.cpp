@@ -1,4 +1,4 @@
-#include "api/client/csv_text.hpp"
+#include "api/recording/csv_text.hpp"
 
 #include <ctime>
 
