@@ -141,7 +141,7 @@ plcctl() {
   return "$code"
 }
 files() {
-  on_machine find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /var/log -o -path /var/cache \
+  on_machine find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /var/tmp -o -path /var/log -o -path /var/cache \
     -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/lib/systemd -o -path /packages -o -path /applications \) -prune -o -print | sort
 }
 manager() { on_machine systemctl show -p MainPID --value plchostd; }
