@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,6 +18,8 @@
 #include <sys/socket.h>
 
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/integration/modbus/modbus_peer.hpp"
 #include "tests/integration/modbus/modbus_program.hpp"
 
@@ -139,6 +142,40 @@ TEST(ModbusServer, ShowsOutputsThatAreFresh) {
     return client.holding(100, 1) == std::vector{4711};
   }));
   EXPECT_TRUE(eventually([&] { return client.holding(100, 1) == std::vector{-4}; }));  // the PLC is silent
+}
+
+// An instance makes it, and the end of the host takes it away.
+TEST(ModbusServer, ShowsAMemoryAreaWhileItIsThere) {
+  Plant plant;
+  const HeldPort port;
+  const std::string text = fmt::format(
+      "[[image]]\nname = \"line1\"\ndirection = \"memory\"\nsize = 12\n[server]\nlisten = \"{}\"\n"
+      "[[server.map]]\nkind = \"holding_register\"\naddress = 0\ncount = 6\nimage = \"line1\"\n",
+      port.address());
+  const ModbusProgram sut(plant, plant.write(text));
+  const Client client(port);
+  ASSERT_TRUE(client.connected()) << sut.log();
+  EXPECT_EQ(client.holding(0, 1), std::vector{-4});
+  const std::string name = pool_memory_name(plant.pool(), "line1");
+  const auto make = [&](std::size_t size, std::uint16_t first, std::uint16_t last) {
+    const MemoryFile memory = MemoryFile::create(name, size).value();
+    std::memcpy(memory.bytes().data(), &first, sizeof first);
+    std::memcpy(memory.bytes().data() + size - sizeof last, &last, sizeof last);
+  };
+  const auto shows = [&](const std::vector<int>& values) {
+    return eventually([&] { return client.holding(0, static_cast<int>(values.size())) == values; });
+  };
+  make(12, 4711, 12);
+  EXPECT_TRUE(shows({4711, 0, 0, 0, 0, 12}));
+  MemoryFile::remove(name);
+  EXPECT_TRUE(shows({-4}));
+  make(10, 1, 2);  // too short
+  EXPECT_EQ(client.holding(0, 1), std::vector{-4});
+  MemoryFile::remove(name);
+  make(12, 1, 2);
+  EXPECT_TRUE(shows({1, 0, 0, 0, 0, 2}));
+  EXPECT_EQ(client.write(0, 3), -2);
+  MemoryFile::remove(name);
 }
 
 TEST(ModbusServer, WritesOnlyWhereItMay) {

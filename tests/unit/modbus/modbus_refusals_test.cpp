@@ -20,6 +20,7 @@ TEST_P(RefusedModbusConfig, SaysWhatIsAllowed) {
 #define DEVICE "[[device]]\nname = \"d\"\ntcp = \"127.0.0.1\"\n"
 #define READ "[[device.read]]\naddress = 0\nimage = \"t.in\"\n"
 #define WRITE "[[device.write]]\naddress = 0\nimage = \"t.out\"\n"
+#define MEMORY "[[image]]\nname = \"line1\"\ndirection = \"memory\"\nsize = 8\n"
 #define SERVER "[server]\nlisten = \"127.0.0.1:1502\"\n[[server.map]]\naddress = 0\n"
 const Refusal kRefusals[] = {
     {"", "m.toml: has nothing to do; add a [[device]] or [server]"},
@@ -47,7 +48,7 @@ const Refusal kRefusals[] = {
     {DEVICE "status_offset = 4\n" READ "kind = \"coil\"\n", "status_offset: needs status_image"},
     {DEVICE "status_image = \"t.in\"\nstatus_offset = 57\n" READ "kind = \"coil\"\n",
      "the status has 8 bytes, and image 't.in' has 64"},
-    {DEVICE "status_image = \"t.out\"\n" READ "kind = \"coil\"\n", "is an output image"},
+    {DEVICE "status_image = \"t.out\"\n" READ "kind = \"coil\"\n", "is no input image"},
     {DEVICE READ, "kind: is missing"},
     {DEVICE "[[device.read]]\nkind = \"coil\"\nimage = \"t.in\"\n",
      "address: is missing; allowed is 0 to 65535"},
@@ -63,6 +64,11 @@ const Refusal kRefusals[] = {
     {DEVICE "[[device.read]]\nkind = \"coil\"\naddress = 0\nimage = \"t.out\"\n",
      "'t.out' is an output image, which the PLC writes"},
     {DEVICE "[[device.write]]\nkind = \"coil\"\naddress = 0\nimage = \"t.in\"\n", "'t.in' is an input image"},
+    {MEMORY DEVICE "[[device.read]]\nkind = \"coil\"\naddress = 0\nimage = \"line1\"\n",
+     "'line1' is a memory area"},
+    {MEMORY DEVICE "[[device.write]]\nkind = \"coil\"\naddress = 0\nimage = \"line1\"\n",
+     "'line1' is a memory area"},
+    {MEMORY SERVER "kind = \"coil\"\nimage = \"line1\"\nwritable = true\n", "'line1' is a memory area"},
     {DEVICE READ "kind = \"holding_register\"\ncount = 33\n",
      "the map ends at byte 66, and image 't.in' has 64"},
     {DEVICE READ "kind = \"coil\"\noffset = 63\nbit = 4\ncount = 5\n", "the map ends at byte 65"},

@@ -55,15 +55,18 @@ void check_kind(SectionReader& reader, const RegisterMap& map, MapUse use) {
 
 void check_direction(SectionReader& reader, const ImageConfig& image, const RegisterMap& map, MapUse use) {
   const bool fills = use == MapUse::device_read || map.writable;
+  const std::string_view is = image.direction == ImageDirection::memory ? "a memory area"
+                              : fills                                   ? "an output image"
+                                                                        : "an input image";
   if (fills && image.direction != ImageDirection::input) {
-    reader.problem("image", fmt::format("'{}' is an output image, which the PLC writes; allowed is an image "
-                                        "with direction = \"input\"",
-                                        shown(image.name)));
+    reader.problem("image",
+                   fmt::format("'{}' is {}, which the PLC writes; allowed is an image with direction = "
+                               "\"input\"",
+                               shown(image.name), is));
   }
   if (use == MapUse::device_write && image.direction != ImageDirection::output) {
-    reader.problem("image", fmt::format("'{}' is an input image; allowed is an image with direction = "
-                                        "\"output\"",
-                                        shown(image.name)));
+    reader.problem("image", fmt::format("'{}' is {}; allowed is an image with direction = \"output\"",
+                                        shown(image.name), is));
   }
 }
 

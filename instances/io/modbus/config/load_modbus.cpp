@@ -196,7 +196,7 @@ class Loader {
     const ImageConfig* const image = find_image(reader, "status_image", config_.images, device.status_image);
     if (image == nullptr) return;
     if (image->direction != ImageDirection::input) {
-      reader.problem("status_image", "is an output image; allowed is an image with direction = \"input\"");
+      reader.problem("status_image", "is no input image; allowed is an image with direction = \"input\"");
     }
     if (device.status_offset + sizeof(DeviceStatus) > image->size) {
       reader.problem("status_offset", fmt::format("the status has {} bytes, and image '{}' has {}",

@@ -28,6 +28,7 @@ enum class RegisterOrder : std::uint8_t { single, abcd, cdab, badc, dcba };
 enum class ImageDirection : std::uint8_t {
   input,   ///< written by this process, read by the PLC
   output,  ///< written by the PLC
+  memory,  ///< a memory area, which is no process image: the server shows it
 };
 
 /// The function that writes a map. The order is that of kFunctionNames.

@@ -16,7 +16,7 @@ using namespace std::string_view_literals;
 inline constexpr std::array kKindNames = {"coil"sv, "discrete_input"sv, "holding_register"sv,
                                           "input_register"sv};
 inline constexpr std::array kOrderNames = {"single"sv, "abcd"sv, "cdab"sv, "badc"sv, "dcba"sv};
-inline constexpr std::array kDirectionNames = {"input"sv, "output"sv};
+inline constexpr std::array kDirectionNames = {"input"sv, "output"sv, "memory"sv};
 inline constexpr std::array kLossNames = {"keep"sv, "zero"sv};
 inline constexpr std::array kFunctionNames = {"auto"sv, "single"sv, "several"sv};
 inline constexpr std::array kParityNames = {"none"sv, "even"sv, "odd"sv};

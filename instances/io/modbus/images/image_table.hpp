@@ -7,6 +7,7 @@
 
 #include "instances/io/modbus/config/modbus_config.hpp"
 #include "instances/io/modbus/images/input_image.hpp"
+#include "instances/io/modbus/images/memory_image.hpp"
 #include "instances/io/modbus/images/output_image.hpp"
 #include "shm/base/result.hpp"
 
@@ -20,6 +21,7 @@ class ImageTable {
   /// Null: there is no such image of that direction.
   [[nodiscard]] InputImage* input(const std::string& name) const noexcept;
   [[nodiscard]] OutputImage* output(const std::string& name) const noexcept;
+  [[nodiscard]] MemoryImage* memory(const std::string& name) const noexcept;
   [[nodiscard]] const std::map<std::string, std::unique_ptr<InputImage>>& inputs() const noexcept {
     return inputs_;
   }
@@ -27,6 +29,7 @@ class ImageTable {
  private:
   std::map<std::string, std::unique_ptr<InputImage>> inputs_;
   std::map<std::string, std::unique_ptr<OutputImage>> outputs_;
+  std::map<std::string, std::unique_ptr<MemoryImage>> memories_;
 };
 
 }  // namespace plchost::modbus

@@ -7,7 +7,10 @@ namespace plchost::modbus {
 ServedMaps::ServedMaps(const ServerConfig& config, const ImageTable& images)
     : silent_after_(config.silent_after) {
   for (const RegisterMap& map : config.maps) {
-    maps_.push_back({.map = &map, .input = images.input(map.image), .output = images.output(map.image)});
+    maps_.push_back({.map = &map,
+                     .input = images.input(map.image),
+                     .output = images.output(map.image),
+                     .memory = images.memory(map.image)});
   }
 }
 
@@ -49,6 +52,7 @@ bool ServedMaps::read_part(const Served& served, const Part& part, MapValues& va
     served.input->look(get);
     return true;
   }
+  if (served.memory != nullptr) return served.memory->look(get);
   bool fresh = false;
   served.output->look([&](std::span<const std::byte> bytes, const OutputImage::Shown& shown) {
     fresh = silent_after_ == Duration::zero() || shown.silence < silent_after_;

@@ -32,6 +32,7 @@ class ServedMaps {
     const RegisterMap* map;
     InputImage* input;  ///< or null
     OutputImage* output;
+    MemoryImage* memory;
   };
   /// The part of a request that lies in one map.
   struct Part {

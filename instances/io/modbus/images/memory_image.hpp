@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "shm/base/time.hpp"
+#include "shm/files/memory_file.hpp"
+
+namespace plchost::modbus {
+
+/// A memory area of an instance that lies in the pool, as it is at the moment: tasks write it whenever they
+/// like. Of values with an address that is a multiple of their size no half is seen. Any thread.
+class MemoryImage {
+ public:
+  MemoryImage(std::string pool, std::string name, std::uint32_t size)
+      : pool_(std::move(pool)), name_(std::move(name)), bytes_(size) {}
+
+  /// Calls `look` with the bytes. False: there is no such memory, or it is shorter; the log says why.
+  template <class Look>
+  bool look(const Look& look) {
+    const std::lock_guard lock(mutex_);
+    if (!refresh()) return false;
+    look(std::span<const std::byte>(bytes_));
+    return true;
+  }
+
+ private:
+  bool refresh();
+  void repair();
+
+  std::string pool_;
+  std::string name_;
+  std::mutex mutex_;
+  std::optional<MemoryFile> memory_;
+  std::vector<std::byte> bytes_;
+  TimePoint looked_at_;   ///< whether the name leads to another file
+  TimePoint tell_again_;  ///< that there is none
+};
+
+}  // namespace plchost::modbus
