@@ -24,7 +24,7 @@ void AckAccount::take(const plc_EventAck& ack) {
   if (ack.rejected != 0) {
     last_rejected_ = std::max(last_rejected_, ack.rejected_sequence);
     rejected_code_ = static_cast<ErrorCode>(ack.rejected_code);
-    rejected_text_ = printable(std::string(dds::text_of(ack.rejected_text)));
+    rejected_text_ = printable_lines(dds::text_of(ack.rejected_text));
   }
   if (ack.sequence_number < first_) {
     base_ = sums();

@@ -46,9 +46,8 @@ void ClientCore::take_replies() {
   dds::take_valid_told<plc_Reply, 16>(
       replies_.reader.get(), answering_, [&](const plc_Reply& reply, const auto& info) {
         replied_.put({reply.header.related_identity, dds::text_of(reply.host)}, [&] {
-          return ApiReply{static_cast<ErrorCode>(reply.code),
-                          printable(std::string(dds::text_of(reply.text))), reply.status_round,
-                          reply.header.related_identity, info.source_timestamp};
+          return ApiReply{static_cast<ErrorCode>(reply.code), printable_lines(dds::text_of(reply.text)),
+                          reply.status_round, reply.header.related_identity, info.source_timestamp};
         });
       });
 }

@@ -45,7 +45,7 @@ void ClientCore::take_runs() {
                              dds::text_of(run.host));
         run_.put(post, [&]() -> Result<RunReport> {
           if (run.code != 0)
-            return failure(static_cast<ErrorCode>(run.code), printable(std::string(dds::text_of(run.text))));
+            return failure(static_cast<ErrorCode>(run.code), printable_lines(dds::text_of(run.text)));
           return RunReport{.tasks = run.tasks,
                            .last_task = std::string(dds::text_of(run.last_task)),
                            .to_start = Duration(run.start_ns),

@@ -22,9 +22,9 @@ namespace plchost {
 // From members of samples to those of the library's types: for library_conversions.hpp, which the build
 // makes.
 
-/// UTF-8 without control characters, whatever the host or an application has written.
+/// Lines of UTF-8 without control characters, whatever the host or an application has written.
 [[nodiscard]] inline std::string text_in(std::string_view text) {
-  return printable(std::string(text));
+  return printable_lines(text);
 }
 
 /// The parts of "a,b" between the commas, or whatever `separator` is.

@@ -68,6 +68,17 @@ bool is_printable_utf8(std::string_view text) noexcept {
   return true;
 }
 
+std::string printable_lines(std::string_view text) {
+  std::string lines;
+  for (;;) {
+    const std::size_t end = text.find('\n');
+    lines += printable(std::string(text.substr(0, end)));
+    if (end == std::string_view::npos) return lines;
+    lines += '\n';
+    text.remove_prefix(end + 1);
+  }
+}
+
 std::string printable(std::string text) {
   if (is_printable_utf8(text)) return text;
   std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');

@@ -38,6 +38,8 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 
 /// The text with '?' in place of characters that could drive a terminal or make two lines of one.
 [[nodiscard]] std::string printable(std::string text);
+/// The same of each line of a text.
+[[nodiscard]] std::string printable_lines(std::string_view text);
 
 /// Whether an object may have this name: 1 to kMaxObjectName bytes of UTF-8 without control characters.
 [[nodiscard]] bool is_object_name(std::string_view name) noexcept;

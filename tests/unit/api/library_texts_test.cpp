@@ -15,6 +15,12 @@ TEST(TextsOfTheLibrary, AreUtf8WhateverTheSampleHas) {
   EXPECT_EQ(to_public(sample).text, "?berlauf?[2J");
 }
 
+TEST(TextsOfTheLibrary, KeepTheirLines) {
+  plc_ExceptionStatus sample{};
+  dds::copy_text(sample.text, "one\n\x1btwo\n");
+  EXPECT_EQ(to_public(sample).text, "one\n?two\n");
+}
+
 TEST(TextsOfTheLibrary, AreUtf8InListsToo) {
   plc_HostStatus sample{};
   dds::copy_text(sample.labels, "press,\xff");
