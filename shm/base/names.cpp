@@ -80,8 +80,14 @@ std::string printable_lines(std::string_view text) {
 }
 
 std::string printable(std::string text) {
-  if (is_printable_utf8(text)) return text;
-  std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
+  for (std::size_t at = 0; at < text.size();) {
+    std::size_t bytes = printable_character(std::string_view(text).substr(at));
+    if (bytes == 0) {
+      text[at] = '?';
+      bytes = 1;
+    }
+    at += bytes;
+  }
   return text;
 }
 

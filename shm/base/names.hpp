@@ -36,7 +36,8 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 /// Whether it is well-formed UTF-8 without control characters.
 [[nodiscard]] bool is_printable_utf8(std::string_view text) noexcept;
 
-/// The text with '?' in place of characters that could drive a terminal or make two lines of one.
+/// The text with '?' in place of each byte that could drive a terminal or make two lines of one, or is no
+/// UTF-8.
 [[nodiscard]] std::string printable(std::string text);
 /// The same of each line of a text.
 [[nodiscard]] std::string printable_lines(std::string_view text);

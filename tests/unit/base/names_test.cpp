@@ -79,6 +79,7 @@ TEST(Names, SaysThatATextIsShortened) {
 TEST(Names, OfAStrangerAreShownWithoutWhatCouldDriveATerminalOrBreakALine) {
   EXPECT_EQ(shown("\x1b[31mline1\n"), "?[31mline1?");
   EXPECT_EQ(shown("\xc3\xa4 1"), "\xc3\xa4 1") << "printable characters stay";
+  EXPECT_EQ(shown("\xc3\xa4\x1b\xc3"), "\xc3\xa4??") << "also beside others";
   EXPECT_EQ(join_some(std::vector<std::string>{"a\tb", "c"}), "a?b, c");
 }
 
