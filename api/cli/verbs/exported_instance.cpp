@@ -46,7 +46,7 @@ constexpr std::string_view kLengthOfMatiec = "126";
 constexpr std::string_view kLengthOfStrucpp = "254";
 
 // Behind "ARRAY ... OF "; empty: of no text.
-std::string_view length_in(std::string_view type) {
+std::string_view text_length_in(std::string_view type) {
   const std::size_t of = type.find("] OF ");
   if (of != std::string_view::npos) type.remove_prefix(of + 5);
   if (!type.starts_with(kText)) return {};
@@ -56,7 +56,7 @@ std::string_view length_in(std::string_view type) {
 // Of an application with the one length of MATIEC no text has a length: its build takes some only without it.
 bool tell_lengths(std::span<const ListedVariable> variables) {
   return std::ranges::any_of(variables, [](const ListedVariable& variable) {
-    const std::string_view length = length_in(dds::text_of(variable.type));
+    const std::string_view length = text_length_in(dds::text_of(variable.type));
     return !is_program(variable) && !length.empty() && length != kLengthOfMatiec;
   });
 }
@@ -88,7 +88,7 @@ ExportedVariable variable_of(const plc_VariableRecord& record, bool with_lengths
     variable.path += name.front();
     name.remove_prefix(1);
   }
-  const std::string_view length = length_in(type);
+  const std::string_view length = text_length_in(type);
   if (!length.empty() && (!with_lengths || length == kLengthOfStrucpp)) type = "STRING";
   variable.type = here.empty() ? std::string(type) : fmt::format("ARRAY [{}] OF {}", here, type);
   return variable;
