@@ -15,7 +15,8 @@ static DDS_Security_boolean decode_once(dds_security_crypto_transform* instance,
                                         const DDS_Security_ParticipantCryptoHandle sender,
                                         DDS_Security_SecurityException* error) {
   if (plain->_buffer != NULL) return true;
-  if (atomic_load(&decode_for_one)(instance, plain, encoded, receiver, sender, error)) return true;
+  const DDS_Security_crypto_transform_decode_rtps_message decode = atomic_load(&decode_for_one);
+  if (decode(instance, plain, encoded, receiver, sender, error)) return true;
   // With this error Cyclone goes on to the next participant.
   DDS_Security_Exception_reset(error);
   error->code = DDS_SECURITY_ERR_INVALID_CRYPTO_RECEIVER_SIGN_CODE;

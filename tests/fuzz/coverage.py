@@ -100,6 +100,8 @@ def lines_of(program, corpus, files, scratch):
                 table[file][1] += 1
             else:
                 table[file][2].setdefault(function.replace("(anonymous namespace)::", "").partition("(")[0], []).append(number)
+    if gone := set(files) - set(table):
+        sys.exit(f"{program.name} has no {' '.join(sorted(gone))}")
     return table
 
 
@@ -120,6 +122,8 @@ def main():
         corpus.mkdir(parents=True, exist_ok=True)
         if chosen.grow:
             grow(program, corpus, chosen.grow)
+        if not table[fuzzer]:
+            continue
         with tempfile.TemporaryDirectory() as scratch:
             for file, (lines, reached, missing) in lines_of(program, corpus, table[fuzzer], pathlib.Path(scratch)).items():
                 share = 100 * reached / lines

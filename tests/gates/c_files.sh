@@ -10,5 +10,7 @@ code=0
 for file in "${files[@]}"; do
   gcc -std=gnu11 -D_GNU_SOURCE= -O2 -Wall -Wextra -Werror -fanalyzer "${include[@]}" -c -o /dev/null "$file" || code=1
 done
-cppcheck --std=c11 --enable=warning,performance,portability --inline-suppr --quiet --error-exitcode=1 "${include[@]}" "${files[@]}" || code=1
+# The release of Cyclone is told by the build. That cppcheck 2.17 does not look at each branch of a large function is no fault.
+cppcheck --std=c11 --enable=warning,performance,portability --inline-suppr --quiet --error-exitcode=1 '-DDDS_VERSION="0"' \
+  --suppress=normalCheckLevelMaxBranches "${include[@]}" "${files[@]}" || code=1
 exit "$code"

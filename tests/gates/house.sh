@@ -30,6 +30,12 @@ while read -r test; do
   grep -qE "$(basename "$test")|GLOB" "$(dirname "$test")/CMakeLists.txt" 2>/dev/null || fault "$test: not in the CMakeLists.txt beside it"
 done < <(git ls-files 'tests/*_test.cpp')
 
+# A fuzzer begins with the inputs of its corpus, and somebody says which files it is for.
+while read -r fuzzer; do
+  [ -n "$(git ls-files "tests/fuzz/corpus/$fuzzer")" ] || fault "tests/fuzz/corpus/$fuzzer: no input for the fuzzer (coverage.py --grow 60 $fuzzer)"
+  grep -qE "^$fuzzer( |$)" tests/fuzz/parsers.txt || fault "tests/fuzz/parsers.txt: $fuzzer has no line"
+done < <(sed -nE 's/^ *plchost_fuzzer\(([a-z_]+).*/\1/p' tests/fuzz/CMakeLists.txt 2>/dev/null)
+
 marker='TO''DO|FIX''ME|X''XX'
 git grep -nE "\b($marker)\b" -- ':!*.md' && fault "the lines above are unfinished" || true
 home_path='/(work|home|root)/[a-z]'

@@ -103,6 +103,10 @@ new_tree
 mkdir -p "$plot/tree/tests" && printf '#!/bin/sh\necho building\n' >"$plot/tree/tests/run.sh" && chmod +x "$plot/tree/tests/run.sh" && commit_tree
 must_be_red "house: script without help" "tests/run.sh --nonsense does not say what there is" "$gates/house.sh" "$plot/tree"
 new_tree
+mkdir -p "$plot/tree/tests/fuzz/corpus/other" && echo 'plchost_fuzzer(planted)' >"$plot/tree/tests/fuzz/CMakeLists.txt" && touch "$plot/tree/tests/fuzz/parsers.txt" && commit_tree
+must_be_red "house: fuzzer without an input" "tests/fuzz/corpus/planted: no input for the fuzzer" "$gates/house.sh" "$plot/tree"
+must_be_red "house: fuzzer without a line" "tests/fuzz/parsers.txt: planted has no line" "$gates/house.sh" "$plot/tree"
+new_tree
 echo "// TO""DO" >"$plot/tree/shm/base/later.cpp" && commit_tree
 must_be_red "house: unfinished" "the lines above are unfinished" "$gates/house.sh" "$plot/tree"
 new_tree

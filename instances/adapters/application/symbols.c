@@ -23,7 +23,7 @@ static void declare(const struct plchost_symbol* symbol) {
   variable.pAddress = symbol->value;
   variable.dwBytes = is_string ? symbol->bytes : 0;
   variable.nDimensions = symbol->dimensions;
-  for (i = 0; i < symbol->dimensions; ++i) {
+  for (i = 0; i < symbol->dimensions && i < PLC_MAX_DIMENSIONS; ++i) {
     variable.aDimensions[i].nFirst = symbol->dimension[i].first;
     variable.aDimensions[i].nCount = symbol->dimension[i].count;
     variable.aDimensions[i].dwStride = symbol->dimension[i].stride;
