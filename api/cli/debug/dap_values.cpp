@@ -1,5 +1,6 @@
 // A DapSession's variables: those of the frames of halted tasks.
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,8 +32,10 @@ std::string without_mark(std::string value) {
   return value;
 }
 
-/// Of an array, in one answer.
-constexpr std::uint64_t kMostElements = 131'072;
+/// Of an array, for a client that knows of no parts.
+constexpr std::uint64_t kMostElements = 1024;
+/// The client of an array waits for no more than what could be read until then.
+constexpr auto kArrayPatience = std::chrono::seconds(5);
 /// Bytes of names in a request to the host.
 constexpr std::size_t kMostNames = 8000;
 
@@ -123,13 +126,12 @@ DapSession::Answer DapSession::elements_of(std::int64_t reference, const Json& a
   if (found == nullptr) return failure(ErrorCode::not_found, "there is no such array");
   const ShownArray shown = *found;
   const Part part(arguments, shown.array.elements(), kIndexed);
-  const std::uint64_t end = part.first + std::min(part.end - part.first, kMostElements);
+  const std::uint64_t end = part.all ? std::min(part.end, part.first + kMostElements) : part.end;
   PLCHOST_TRY_ASSIGN(auto made, shown.locals == 0 ? declared_elements(shown.array, part.first, end)
                                                   : local_elements(shown, part.first, end));
-  const std::uint64_t left = part.end - part.first - made.size();
-  if (left > 0 && (part.all || shown.locals != 0)) {
+  if (const std::uint64_t wanted = part.end - part.first; made.size() < wanted) {
     made.push_back({{"name", "..."},
-                    {"value", fmt::format("{} not told", count_text(left, "element"))},
+                    {"value", fmt::format("{} not told", count_text(wanted - made.size(), "element"))},
                     {"variablesReference", 0}});
   }
   return Json{{"variables", std::move(made)}};
@@ -140,7 +142,8 @@ DapSession::Answer DapSession::declared_elements(const ExpandedArray& array, std
   Json made = Json::array();
   VariableQuery query;
   std::size_t bytes = 0;
-  for (std::uint64_t i = first; i < end; ++i) {
+  const TimePoint latest = link_.now() + kArrayPatience;
+  for (std::uint64_t i = first; i < end && link_.now() < latest; ++i) {
     query.patterns.push_back(array.element(i));
     bytes += query.patterns.back().size() + 1;
     if (bytes + kMaxVariableName <= kMostNames && i + 1 != end) continue;

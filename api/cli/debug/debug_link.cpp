@@ -1,6 +1,7 @@
 #include "api/cli/debug/debug_link.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <string_view>
 
@@ -21,6 +22,8 @@ namespace {
 constexpr int kAttempts = 5;
 // A host that says that its state is longer is not believed.
 constexpr std::size_t kLongestState = std::size_t{1} << 20;
+// The instance ends a session of which it has had no sign for 10 s. Each request for the state is one.
+constexpr auto kSign = std::chrono::seconds(1);
 // A write waits for a moment between cycles.
 constexpr auto kWritePatience = std::chrono::seconds(10);
 
@@ -64,7 +67,8 @@ DebugRequests debug_requests(CliSession& session, const std::string& host, const
       .read_state = [&session, host, instance](const DebugQuery& query) -> Result<DebugPart> {
         PLCHOST_TRY_ASSIGN(auto* const client, session.client());
         return client->read_debug(host, instance, query, session.deadline());
-      }};
+      },
+      .now = MonotonicClock::now};
 }
 
 Result<std::string> DebugLink::attach(bool take) {
@@ -89,6 +93,11 @@ Result<nlohmann::json> DebugLink::command(const std::string& text) {
   return parsed(answer);
 }
 
+Result<void> DebugLink::stay() {
+  if (number_ != 0 && now() - seen_ >= kSign) PLCHOST_TRY(part(0));
+  return {};
+}
+
 Result<DebugPart> DebugLink::part(std::size_t offset) {
   auto part = requests_.read_state({.session = number_, .offset = offset});
   if (!part && part.error().code == ErrorCode::not_found && number_ != 0) {
@@ -96,6 +105,7 @@ Result<DebugPart> DebugLink::part(std::size_t offset) {
         ErrorCode::wrong_state,
         "the debug session is over: the process of the instance has ended, or has another application");
   }
+  seen_ = now();
   return part;
 }
 
@@ -132,6 +142,7 @@ Result<nlohmann::json> DebugLink::state() {
 Result<std::vector<ListedVariable>> DebugLink::listed(VariableQuery query) {
   std::vector<ListedVariable> all;
   for (bool goes_on = true; goes_on;) {
+    PLCHOST_TRY(stay());
     PLCHOST_TRY_ASSIGN(auto page, requests_.list_variables(query));
     PLCHOST_TRY_ASSIGN(goes_on, next_page(host_, page, query));
     std::ranges::move(page.variables, std::back_inserter(all));

@@ -14,6 +14,7 @@
 #include "api/dds/debug_page.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 #include "shm/operations/operations.hpp"
 
 namespace plchost {
@@ -24,6 +25,7 @@ struct DebugRequests {
   std::function<Result<std::string>(ControlVerb verb, const std::string& argument)> call;
   std::function<Result<VariableListing>(const VariableQuery&)> list_variables;
   std::function<Result<DebugPart>(const DebugQuery&)> read_state;
+  std::function<TimePoint()> now = MonotonicClock::now;
 };
 
 /// The same over DDS. The session outlives them.
@@ -37,6 +39,7 @@ class DebugLink {
       : requests_(std::move(requests)), host_(std::move(host)), instance_(std::move(instance)) {}
 
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
+  [[nodiscard]] TimePoint now() const { return requests_.now(); }
 
   /// Begins the session; the remark of the instance. `take`: also if another debugger has it.
   [[nodiscard]] Result<std::string> attach(bool take);
@@ -53,7 +56,8 @@ class DebugLink {
   [[nodiscard]] Result<std::vector<ListedVariable>> variables(const std::string& pattern) {
     return listed({.patterns = {pattern}});
   }
-  /// All that a query means, with their values.
+  /// All that a query means, with their values. However many requests it takes, the instance gets a sign of
+  /// this debugger each second.
   [[nodiscard]] Result<std::vector<ListedVariable>> listed(VariableQuery query);
   /// The variables that are of no program. Of an application that tells no programs: those without a dot in
   /// their names.
@@ -71,6 +75,8 @@ class DebugLink {
 
  private:
   [[nodiscard]] Result<DebugPart> part(std::size_t offset);
+  /// Tells the instance that this debugger is there, if it has not heard so for a second.
+  [[nodiscard]] Result<void> stay();
   /// Nothing: it has changed in between.
   [[nodiscard]] Result<std::optional<std::string>> whole_state();
 
@@ -78,6 +84,7 @@ class DebugLink {
   std::string host_;
   std::string instance_;
   std::uint64_t number_ = 0;
+  TimePoint seen_;  // by the instance
 };
 
 }  // namespace plchost

@@ -1,5 +1,8 @@
 // The values that a client of the Debug Adapter Protocol is shown.
+#include <algorithm>
+#include <chrono>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -91,7 +94,54 @@ TEST_F(DapSessionTest, TellsThePartOfALargeArrayThatItsClientAsksFor) {
   EXPECT_EQ(part({{"start", 99'990}, {"count", 500}}).size(), 10U);
   EXPECT_EQ(part({{"start", 100'000}, {"count", 5}}).size(), 0U);
   EXPECT_EQ(part({{"filter", "named"}}).size(), 0U);
-  EXPECT_EQ(part({{"start", 98'000}, {"count", 0}}).size(), 2'000U) << "all behind it";
+  EXPECT_EQ(part({{"start", 99'000}, {"count", 0}}).size(), 1'000U) << "all behind it";
+  EXPECT_EQ(part({{"start", 0}, {"count", 3'000}}).size(), 3'000U);
+  const json begin = part({{"start", 98'000}});
+  ASSERT_EQ(begin.size(), 1'025U);
+  EXPECT_EQ(begin.back()["value"], "976 elements not told");
+}
+
+/// An array of 100,000 elements; each request for variables takes a while.
+class DapSlowInstance : public DapSessionTest {
+ protected:
+  DapSlowInstance() {
+    instance_.variables.push_back(variable_record("Main.c.big[]", "ARRAY [1..100000] OF INT", "[0...]"));
+    instance_.make_element = [](const std::string& name) { return variable_record(name, "INT", "0"); };
+    reference_ =
+        ask("variables", {{"variablesReference", kInnermost}})["variables"].back()["variablesReference"];
+    instance_.slowness = std::chrono::milliseconds(200);
+    (void)sut_.look();
+    instance_.signs.clear();
+    begin_ = instance_.now;
+  }
+  // Between signs, and between the last one and now.
+  [[nodiscard]] Duration longest_silence() const {
+    TimePoint last = begin_;
+    Duration longest{};
+    for (const TimePoint sign : instance_.signs)
+      longest = std::max(longest, sign - std::exchange(last, sign));
+    return std::max(longest, instance_.now - last);
+  }
+
+  int reference_ = 0;
+  TimePoint begin_;
+};
+
+// The instance ends a session without a sign for 10 s.
+TEST_F(DapSlowInstance, HearsOfItsDebuggerWhileALongArrayIsRead) {
+  const json told =
+      ask("variables", {{"variablesReference", reference_}, {"start", 0}, {"count", 100'000}})["variables"];
+  EXPECT_GT(told.size(), 1'024U);
+  EXPECT_EQ(told.back()["name"], "...");
+  EXPECT_EQ(told.back()["value"], fmt::format("{} elements not told", 100'001 - told.size()));
+  EXPECT_EQ(instance_.now - begin_, std::chrono::seconds(5));
+  EXPECT_EQ(longest_silence(), std::chrono::seconds(1));
+}
+
+TEST_F(DapSlowInstance, HearsOfItsDebuggerWhileManyRequestsAreCarriedOut) {
+  for (int i = 0; i < 30; ++i)
+    (void)ask("variables", {{"variablesReference", reference_}, {"start", 100 * i}, {"count", 100}});
+  EXPECT_EQ(longest_silence(), std::chrono::seconds(1));
 }
 
 TEST_F(DapSessionTest, TellsThePartOfAScopeThatItsClientAsksFor) {

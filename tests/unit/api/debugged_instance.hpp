@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <iterator>
@@ -14,6 +15,7 @@
 
 #include "api/cli/debug/debug_link.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -33,7 +35,10 @@ struct DebuggedInstance {
   std::vector<plc_VariableRecord> elements;  ///< of arrays among them, by their whole names
   /// Of each name with an index, if it is there.
   std::function<plc_VariableRecord(const std::string& name)> make_element;
-  std::size_t asked_patterns = 0;                ///< in requests for variables
+  std::size_t asked_patterns = 0;  ///< in requests for variables
+  Duration slowness{};             ///< the time of each of them
+  TimePoint now = TimePoint(std::chrono::hours(1));
+  std::vector<TimePoint> signs;                  ///< when its state was read
   std::vector<std::string> commands;             ///< that came, without the number of the session
   std::vector<std::string> written;              ///< NAME=VALUE
   bool busy = false;                             ///< it refuses commands
@@ -67,11 +72,13 @@ struct DebuggedInstance {
     return {.call = [this](ControlVerb verb, const std::string& argument) { return answer(verb, argument); },
             .list_variables = [this](const VariableQuery& query) { return list(query); },
             .read_state = [this](const DebugQuery& /*query*/) -> Result<DebugPart> {
+              signs.push_back(now);
               nlohmann::json told{{"session", 1}, {"tasks", tasks}};
               if (!breakpoints.is_null()) told["breakpoints"] = breakpoints;
               const std::string state = told.dump();
               return DebugPart{.version = 1, .size = state.size(), .text = state};
-            }};
+            },
+            .now = [this] { return now; }};
   }
 
  private:
@@ -87,6 +94,7 @@ struct DebuggedInstance {
   }
 
   Result<VariableListing> list(const VariableQuery& query) {
+    now += slowness;
     VariableListing page;
     if (query.patterns.empty()) page.variables.assign(variables.begin(), variables.end());
     asked_patterns += query.patterns.size();
