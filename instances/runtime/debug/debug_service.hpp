@@ -25,6 +25,8 @@
 
 namespace plchost {
 
+class TextBudget;
+
 // The debugging of an application
 // ===============================
 //
@@ -122,7 +124,8 @@ class DebugService {
   /// Of a task that halts; 0: where it halts.
   [[nodiscard]] Result<const Plc_Frame*> frame_of(std::string_view task, std::string_view number) const;
   [[nodiscard]] std::string_view state_text(const DebugTask& task, bool halted) const noexcept;
-  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, StackDetail detail) const;
+  [[nodiscard]] nlohmann::json state_of_task(std::size_t number, StackDetail detail,
+                                             TextBudget& budget) const;
   [[nodiscard]] std::string remark() const;
   [[nodiscard]] std::string remark_of(const Breakpoint& breakpoint) const;
   void end_session(std::string_view why);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "instances/runtime/debug/debug_service.hpp"
+#include "instances/runtime/debug/told_locals.hpp"
 
 namespace plchost {
 
@@ -26,31 +27,6 @@ std::string_view reason_text(HaltReason reason) noexcept {
   return "";
 }
 
-Json value_of(const DeclaredLocal& local, const std::byte* address, std::size_t most_elements) {
-  const VariableSymbol& symbol = local.symbol;
-  const auto text_at = [&](std::uint32_t offset) {
-    return variable_text(symbol.type, std::span(address + offset, symbol.bytes));
-  };
-  if (symbol.dimensions.empty())
-    return {{"name", symbol.name}, {"type", traits_of(symbol.type).name}, {"value", text_at(0)}};
-  Json elements = Json::array();
-  for (std::uint32_t i = 0; i < std::min<std::size_t>(symbol.elements(), most_elements); ++i)
-    elements.push_back(text_at(local.offset(i)));
-  return {{"name", symbol.name}, {"type", type_text(symbol)}, {"elements", std::move(elements)}};
-}
-
-// Those of its statement that this call has.
-Json locals_of(const Plc_Frame& frame, const DeclaredPou& pou, std::size_t most_elements) {
-  Json locals = Json::array();
-  for (std::uint32_t i = 0; i < pou.locals.size(); ++i) {
-    const DeclaredLocal& local = pou.locals[i];
-    const std::byte* const address = local_address(frame, i);
-    if (address == nullptr || !local.is_at(frame.dwLine)) continue;
-    locals.push_back(value_of(local, address, most_elements));
-  }
-  return locals;
-}
-
 // In steps: else the state would be another one at each look, and be written and read anew.
 Duration time_of(const DebugTask::Halt& halt) {
   constexpr auto kStep = std::chrono::milliseconds(100);
@@ -58,16 +34,17 @@ Duration time_of(const DebugTask::Halt& halt) {
 }
 
 // The frames are on the stack of a thread that sleeps.
-Json frames_of(const Plc_Frame* frame, const PouCollection& pous, DebugService::StackDetail detail) {
+Json frames_of(const Plc_Frame* frame, const PouCollection& pous, DebugService::StackDetail detail,
+               TextBudget& budget) {
   Json frames = Json::array();
-  for (; frame != nullptr && frames.size() < detail.frames; frame = frame->pCaller) {
+  for (; frame != nullptr && frames.size() < detail.frames && !budget.is_spent(); frame = frame->pCaller) {
     if (frame->pPou == nullptr || frame->pPou->dwNumber >= pous.pous().size()) break;
     const DeclaredPou& pou = pous.pous()[frame->pPou->dwNumber];
     Json one{{"pou", pou.name}, {"file", pou.file}, {"line", frame->dwLine}};
     const auto path = pous.path_of(frame->pPou->dwNumber, frame->pSelf);
     if (!path.empty()) one["instance"] = path;
     if (frame->nLocals > 0 && frames.size() < detail.with_locals) {
-      one["locals"] = locals_of(*frame, pou, detail.elements);
+      one["locals"] = told_locals(*frame, pou, detail.elements, budget);
     } else if (frame->nLocals > 0) {
       one["locals_left_out"] = true;
     }
@@ -122,7 +99,7 @@ std::string_view DebugService::state_text(const DebugTask& task, bool halted) co
   return task.ignored() ? "ignored" : "runs";
 }
 
-nlohmann::json DebugService::state_of_task(std::size_t number, StackDetail detail) const {
+nlohmann::json DebugService::state_of_task(std::size_t number, StackDetail detail, TextBudget& budget) const {
   const DebugTask& task = *tasks_[number];
   const auto halt = task.halt();  // once: it may halt meanwhile, and a state has its place and stack
   Json one{{"task", name_of(number)}, {"state", state_text(task, halt.has_value())}};
@@ -140,15 +117,18 @@ nlohmann::json DebugService::state_of_task(std::size_t number, StackDetail detai
   one["halt"] = halt->number;
   one["reason"] = reason_text(halt->reason);
   if (halt->breakpoint != 0) one["breakpoint"] = halt->breakpoint;
-  one["stack"] = frames_of(halt->frame, program_.pous(), detail);
+  one["stack"] = frames_of(halt->frame, program_.pous(), detail, budget);
   return one;
 }
 
 std::string DebugService::state(std::size_t most) const {
   const auto dump = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
   for (const Detail& detail : kDetails) {
+    TextBudget budget(most);
     Json tasks = Json::array();
-    for (std::size_t i = 0; i < tasks_.size(); ++i) tasks.push_back(state_of_task(i, detail.stack));
+    for (std::size_t i = 0; i < tasks_.size() && !budget.is_spent(); ++i)
+      tasks.push_back(state_of_task(i, detail.stack, budget));
+    if (budget.is_spent()) continue;
     Json breakpoints = Json::array();
     for (const auto& breakpoint : breakpoints_) {
       if (detail.breakpoints) breakpoints.push_back(json_of(*breakpoint, program_.pous(), detail.texts));
