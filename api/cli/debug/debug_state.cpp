@@ -38,7 +38,8 @@ std::string value_of_local(const Json& local) {
     if (told == kShownElements) break;
     text += fmt::format("{}{}", told++ == 0 ? "" : ", ", element.get<std::string>());
   }
-  return text + (array && array->elements() > told ? ", ...]" : "]");
+  if (!array || array->elements() <= told) return text + "]";
+  return text + (told == 0 ? "...]" : ", ...]");
 }
 
 namespace {
@@ -59,9 +60,12 @@ Result<Json> element_of(const Json& local, const IndexedName& indexed) {
                    fmt::format("{} is no array: it is {}", shown(name), local.value("type", "")));
   }
   PLCHOST_TRY_ASSIGN(const auto number, array->number(indexed));
-  std::string value = number < elements.size()
-                          ? elements[number].get<std::string>()
-                          : fmt::format("(only the first {} elements are told)", elements.size());
+  std::string value = "(no element is told)";
+  if (number < elements.size()) {
+    value = elements[number].get<std::string>();
+  } else if (!elements.empty()) {
+    value = fmt::format("(only the first {} elements are told)", elements.size());
+  }
   return Json{{"name", array->element(number)}, {"type", array->element_type()}, {"value", std::move(value)}};
 }
 

@@ -77,11 +77,14 @@ struct Detail {
 };
 constexpr std::size_t kFrames = DebugService::kMostFrames;
 constexpr std::size_t kFewElements = 16;
+// An array never takes the place of a variable that is none.
 constexpr std::array kDetails{
     Detail{{kFrames, kFrames, DebugService::kMostElements}, true, true, ""},
     Detail{{kFrames, kFrames, kFewElements}, true, true, "elements of local arrays"},
+    Detail{{kFrames, kFrames, 0}, true, true, "all elements of local arrays"},
     Detail{
         {kFrames, 1, kFewElements}, true, true, "local variables of callers, and elements of local arrays"},
+    Detail{{kFrames, 1, 0}, true, true, "local variables of callers, and all elements of local arrays"},
     Detail{{kFrames, 0, 0}, true, true, "local variables"},
     Detail{{4, 0, 0}, true, true, "local variables"},
     Detail{{4, 0, 0},

@@ -166,6 +166,36 @@ TEST_F(DebuggingByHand, LeavesLocalVariablesOfCallersOutOfAStateThatIsTooLong) {
   command("local Edge 40 level=7");
 }
 
+TEST_F(DebuggingByHand, LeavesElementsOfArraysOutBeforeOtherLocalVariables) {
+  attach();
+  const auto halted_at = [&](const char* breakpoint) {
+    command(breakpoint);
+    process_->event("edge").post();
+    return halts("Edge");
+  };
+  const auto locals_of = [&](std::size_t frame) {
+    return task("Edge")["stack"][frame].value("locals", json::array());
+  };
+  ASSERT_TRUE(halted_at("break Wide if NOT (from_deep OR again)"));
+  EXPECT_EQ(state().value("left_out", ""), "all elements of local arrays");
+  json wide = locals_of(0);
+  ASSERT_EQ(wide.size(), 18U);
+  EXPECT_EQ(wide[2]["name"], "a[]");
+  EXPECT_EQ(wide[2]["elements"].size(), 0U);
+  wide = locals_of(1);
+  ASSERT_EQ(wide.size(), 18U) << "also those of its caller";
+  EXPECT_EQ(wide[1]["value"], "TRUE");
+  command("delete *");
+  command("continue Edge");
+  ASSERT_TRUE(eventually([&] { return task("Edge").value("state", "") != "halted"; }));
+  ASSERT_TRUE(halted_at("break Wide if from_deep"));
+  EXPECT_EQ(state().value("left_out", ""), "local variables of callers, and all elements of local arrays");
+  wide = locals_of(0);
+  ASSERT_EQ(wide.size(), 18U);
+  EXPECT_EQ(wide[0]["value"], "TRUE");
+  EXPECT_EQ(locals_of(1).size(), 0U);
+}
+
 TEST_F(DebuggingByHand, WritesLocalVariablesIntoLogPoints) {
   attach();
   command("break Twice hits %5 log {value} times {factor}");

@@ -124,6 +124,16 @@ TEST_F(DebugConsoleFrames, HaveElementsOfLocalArrays) {
   EXPECT_THAT(said("print x[1]"), HasSubstr("x is no array: it is INT"));
 }
 
+TEST_F(DebugConsoleFrames, HaveLocalArraysOfWhichNoElementIsTold) {
+  instance_.tasks[0]["stack"][1]["locals"].push_back(
+      {{"name", "t[]"}, {"type", "ARRAY [1..2] OF INT"}, {"elements", json::array()}});
+  (void)said("frame 1");
+  EXPECT_EQ(said("print t"), "t[] = [...]\n");
+  EXPECT_EQ(said("print t[1]"), "t[1] = (no element is told)\n");
+  EXPECT_EQ(said("set t[2]=7"), "t[2] = (no element is told)\n");
+  EXPECT_EQ(instance_.commands.back(), "local fast 1 t[2]=7");
+}
+
 TEST_F(DebugConsoleFrames, WhoseLocalVariablesAreNotToldMeanNoOthers) {
   (void)said("frame 2");
   EXPECT_THAT(said("print"), HasSubstr("the local variables of this call are too long to be told"));

@@ -35,6 +35,11 @@ static int bias;
 /* The text of all local variables of Deep: too long to be told of all its calls. */
 static char label[256];
 
+/* Of the elements of Wide's arrays. 16 elements of each array are too long to be told: the short texts of two
+ * calls, the long ones also of one. */
+#define WIDE_ELEMENTS 16
+static char labels[2][WIDE_ELEMENTS][sizeof label];
+
 static void* main_output;
 static void* edge_output;
 
@@ -69,11 +74,49 @@ static const Plc_Local deep_locals[] = {{"level", PLC_TYPE_INT, 0, 0, 0},
                                         DEEP_TEXT("h")};
 static Plc_Pou deep = {sizeof(Plc_Pou), "Deep", "src/steps.st", deep_lines, 1, 0, deep_locals, 9, 0, 0};
 
+static const unsigned int wide_lines[] = {72};
+#define WIDE_ARRAYS 16
+#define WIDE_TEXTS(name) {name "[]", PLC_TYPE_STRING, sizeof label, 0, 0}
+static const Plc_Local wide_locals[] = {{"from_deep", PLC_TYPE_BOOL, 0, 0, 0},
+                                        {"again", PLC_TYPE_BOOL, 0, 0, 0},
+                                        WIDE_TEXTS("a"),
+                                        WIDE_TEXTS("b"),
+                                        WIDE_TEXTS("c"),
+                                        WIDE_TEXTS("d"),
+                                        WIDE_TEXTS("e"),
+                                        WIDE_TEXTS("f"),
+                                        WIDE_TEXTS("g"),
+                                        WIDE_TEXTS("h"),
+                                        WIDE_TEXTS("i"),
+                                        WIDE_TEXTS("j"),
+                                        WIDE_TEXTS("k"),
+                                        WIDE_TEXTS("l"),
+                                        WIDE_TEXTS("m"),
+                                        WIDE_TEXTS("n"),
+                                        WIDE_TEXTS("o"),
+                                        WIDE_TEXTS("p")};
+static Plc_LocalArray wide_arrays[WIDE_ARRAYS];
+static Plc_Pou wide = {sizeof(Plc_Pou), "Wide",          "src/steps.st", wide_lines, 1, 0,
+                       wide_locals,     2 + WIDE_ARRAYS, wide_arrays,    WIDE_ARRAYS};
+
+static void run_wide(unsigned char from_deep, unsigned char again) {
+  void* const texts = labels[from_deep];
+  void* const locals[] = {&from_deep, &again, texts, texts, texts, texts, texts, texts, texts,
+                          texts,      texts,  texts, texts, texts, texts, texts, texts, texts};
+  PLC_ENTER_LOCALS(wide, 0, locals, 0);
+  PLC_STATEMENT(72);
+  if (again) run_wide(from_deep, 0);
+}
+
 static void run_deep(short level) {
   void* const locals[] = {&level, label, label, label, label, label, label, label, label};
   PLC_ENTER_LOCALS(deep, 0, locals, 0);
   PLC_STATEMENT(62);
-  if (level > 0) run_deep((short)(level - 1));
+  if (level > 0) {
+    run_deep((short)(level - 1));
+  } else {
+    run_wide(1, 0);
+  }
 }
 
 static int run_twice(int value) {
@@ -122,13 +165,26 @@ static void CDECL run_edge(void) {
   ++edge_program.runs;
   *(int*)edge_output = edge_program.runs;
   run_deep(40);
+  run_wide(0, 1);
+}
+
+static int declare_wide(void) {
+  for (unsigned int i = 0; i < WIDE_ARRAYS; ++i) {
+    const Plc_LocalArray array = {i + 2, 1, {{0, WIDE_ELEMENTS, sizeof label}}};
+    wide_arrays[i] = array;
+  }
+  for (unsigned int i = 0; i < WIDE_ELEMENTS; ++i) {
+    memset(labels[0][i], 'x', 150);
+    memset(labels[1][i], 'x', sizeof label - 1);
+  }
+  return plc_debug_declare_pou(&wide) == ERR_OK;
 }
 
 static int declare_pous(void) {
   return plc_debug_declare_pou(&twice) == ERR_OK && plc_debug_declare_pou(&counter) == ERR_OK &&
          plc_debug_declare_pou(&main_pou) == ERR_OK && plc_debug_declare_pou(&other) == ERR_OK &&
          plc_debug_declare_pou(&edge) == ERR_OK && plc_debug_declare_pou(&lamp) == ERR_OK &&
-         plc_debug_declare_pou(&deep) == ERR_OK &&
+         plc_debug_declare_pou(&deep) == ERR_OK && declare_wide() &&
          plc_debug_declare_instance(&lamp, &lamps[0], "left") == ERR_OK &&
          plc_debug_declare_instance(&lamp, &lamps[1], "right") == ERR_OK &&
          plc_debug_declare_instance(&main_pou, &main_program, "Main") == ERR_OK &&
