@@ -46,7 +46,8 @@ std::string declared_arrays(std::size_t pou, std::span<const DebugLocal> locals)
   return fmt::format(
       "  static const Plc_LocalArray plchost_arrays_{0}[] = {{\n{1}  }};\n"
       "  plchost_pou_{0}.pArrays = plchost_arrays_{0};\n"
-      "  plchost_pou_{0}.nArrays = {2}u;\n",
+      "  plchost_pou_{0}.nArrays = {2}u;\n"
+      "  plchost_pou_{0}.dwSize = sizeof(Plc_Pou);\n",
       pou, rows, count);
 }
 
@@ -80,6 +81,7 @@ bool are_allowed(std::span<const DebugLocal::Dimension> dimensions) noexcept {
   return dimensions.size() <= kMaxVariableDimensions;
 }
 
+// A POU without an array says the size of before there were any: each runtime takes it.
 std::string debug_header(std::span<const DebugPou> pous) {
   std::string text = "/* Written by plcctl build application. */\n#include \"plc_debug.h\"\n";
   for (const std::string_view macro : kHeaderMacros) text += fmt::format("#undef {}\n", macro);
@@ -87,7 +89,8 @@ std::string debug_header(std::span<const DebugPou> pous) {
     const std::vector<unsigned> lines = ascending(pous[i].lines);
     text += fmt::format(
         "static const unsigned int plchost_lines_{0}[] = {{{1}u}};\n"
-        "static Plc_Pou plchost_pou_{0} = {{sizeof(Plc_Pou), \"{2}\", {3}, plchost_lines_{0}, {4}u, 0u, 0, "
+        "static Plc_Pou plchost_pou_{0} = {{__builtin_offsetof(Plc_Pou, pArrays), \"{2}\", {3}, "
+        "plchost_lines_{0}, {4}u, 0u, 0, "
         "0u, 0, 0u}};\n",
         i, fmt::join(lines, "u, "), pous[i].name, in_quotes(pous[i].file), lines.size());
   }

@@ -14,9 +14,9 @@ using testing::HasSubstr;
 TEST(DebugPous, AreDeclaredWithTheirInstances) {
   const std::vector<DebugPou> pous{{"Main", "a.st", {3, 2, 3}}, {"Counter", "a.st", {9}}};
   const std::vector<DebugInstance> instances{{.pou = 1, .value = "x.UP", .path = "Main0.up"}};
-  EXPECT_THAT(debug_header(pous),
-              HasSubstr("plchost_lines_0[] = {2u, 3u};\nstatic Plc_Pou plchost_pou_0 = "
-                        "{sizeof(Plc_Pou), \"Main\", \"a.st\", plchost_lines_0, 2u, 0u, 0, 0u, 0, 0u};"));
+  EXPECT_THAT(debug_header(pous), HasSubstr("plchost_lines_0[] = {2u, 3u};\nstatic Plc_Pou plchost_pou_0 = "
+                                            "{__builtin_offsetof(Plc_Pou, pArrays), \"Main\", \"a.st\", "
+                                            "plchost_lines_0, 2u, 0u, 0, 0u, 0, 0u};"));
   const std::string text = debug_declarations(pous, instances);
   EXPECT_THAT(text, HasSubstr("plc_debug_declare_pou(&plchost_pou_1) == 0;\n"));
   EXPECT_THAT(text, HasSubstr("plc_debug_declare_instance(&plchost_pou_1, &x.UP, \"Main0.up\") == 0;\n"));
@@ -46,6 +46,7 @@ TEST(DebugPous, AreDeclaredWithTheirLocalVariables) {
                               "  good = good && plc_debug_declare_pou(&plchost_pou_1) == 0;\n"));
   EXPECT_THAT(text, testing::Not(HasSubstr("plchost_locals_0")));
   EXPECT_THAT(text, testing::Not(HasSubstr("plchost_arrays_")));
+  EXPECT_THAT(text, testing::Not(HasSubstr("dwSize"))) << "a runtime of before arrays takes them";
 }
 
 TEST(DebugPous, AreDeclaredWithTheDimensionsOfTheirLocalArrays) {
@@ -61,7 +62,8 @@ TEST(DebugPous, AreDeclaredWithTheDimensionsOfTheirLocalArrays) {
   EXPECT_THAT(debug_declarations(pous, {}),
               HasSubstr("  static const Plc_LocalArray plchost_arrays_0[] = {\n"
                         "    {1u, 2u, {{-1, 2u, 3u * sizeof(DINT)}, {0, 3u, 1u * sizeof(DINT)}}},\n  };\n"
-                        "  plchost_pou_0.pArrays = plchost_arrays_0;\n  plchost_pou_0.nArrays = 1u;\n"));
+                        "  plchost_pou_0.pArrays = plchost_arrays_0;\n  plchost_pou_0.nArrays = 1u;\n"
+                        "  plchost_pou_0.dwSize = sizeof(Plc_Pou);\n"));
 }
 
 // A program may have them as names of its own.
