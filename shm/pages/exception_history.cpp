@@ -1,6 +1,7 @@
 #include "shm/pages/exception_history.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <utility>
 
@@ -20,6 +21,7 @@ using Json = nlohmann::json;
 
 constexpr int kVersion = 1;
 constexpr std::size_t kMaxFile = std::size_t{256} << 10;
+constexpr std::string_view kUntold = "only its process knew it, and could not tell it any more";
 
 Json to_json(const ExceptionEntry& entry) {
   return {{"number", entry.number},
@@ -63,13 +65,56 @@ bool same(const ExceptionEntry& one, const ExceptionEntry& other) {
   return one.unix_ns != 0 && one.unix_ns == other.unix_ns && one.task == other.task;
 }
 
+bool holds(const ExceptionHistory& history, const ExceptionEntry& entry) {
+  return std::ranges::any_of(history.entries, [&](const ExceptionEntry& kept) { return same(kept, entry); });
+}
+
+// The manager finds no functions.
+bool tells_less(const ExceptionEntry& entry, const ExceptionEntry& known) {
+  return entry.back_trace_end == kUntold || (entry.symbol.empty() && !known.symbol.empty()) ||
+         (entry.back_trace.empty() && !known.back_trace.empty());
+}
+
+// Whether it was there and made room for newer ones. If the oldest one that is kept lies in the future, the
+// clock was set back: then times say nothing.
+bool was_dropped(const ExceptionHistory& history, const ExceptionEntry& entry) {
+  if (history.count <= history.entries.size() || history.entries.empty() || entry.unix_ns == 0) return false;
+  const std::int64_t oldest = history.entries.front().unix_ns;
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return entry.unix_ns <= oldest && oldest <= std::chrono::nanoseconds(now).count();
+}
+
+std::string to_text(const ExceptionHistory& history) {
+  Json entries = Json::array();
+  for (const ExceptionEntry& entry : history.entries) entries.push_back(to_json(entry));
+  const Json json{{"version", kVersion}, {"count", history.count}, {"exceptions", std::move(entries)}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+// As much of it as a reader takes: the newest exceptions, and of these the newest back-traces.
+std::string bounded_text(ExceptionHistory history) {
+  std::string text = to_text(history);
+  for (ExceptionEntry& entry : history.entries) {
+    if (text.size() <= kMaxFile) return text;
+    if (entry.back_trace.empty()) continue;
+    entry.back_trace.clear();
+    entry.back_trace_end = "it was dropped for those of newer exceptions";
+    text = to_text(history);
+  }
+  while (text.size() > kMaxFile && !history.entries.empty()) {
+    history.entries.erase(history.entries.begin());
+    text = to_text(history);
+  }
+  return text;
+}
+
 }  // namespace
 
 void ExceptionHistory::add(ExceptionEntry entry) {
   const auto known =
       std::ranges::find_if(entries, [&](const ExceptionEntry& kept) { return same(kept, entry); });
   if (known != entries.end()) {
-    if (entry.symbol.empty()) return;
+    if (tells_less(entry, *known)) return;
     entry.number = known->number;
     *known = std::move(entry);
     return;
@@ -83,6 +128,8 @@ ExceptionEntry exception_entry(const FaultRecord& record, std::string_view appli
                                std::string_view task) {
   // Other signals give the address of the instruction once more.
   const bool of_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
+  // As the process walks the stack: where a signal or a watchdog has stopped the thread.
+  const bool stopped = record.kind == FaultKind::signal || record.address != 0;
   return {.unix_ns = record.unix_ns,
           .application = std::string(application),
           .task = std::string(task),
@@ -94,7 +141,7 @@ ExceptionEntry exception_entry(const FaultRecord& record, std::string_view appli
           .memory_address = of_memory ? record.memory_address : 0,
           .text = describe_fault(record),
           .back_trace = {},
-          .back_trace_end = "only its process knew it, and could not tell it any more"};
+          .back_trace_end = stopped ? std::string(kUntold) : describe_end(BackTrace{})};
 }
 
 std::string exception_path(std::string_view run_directory, std::string_view instance) {
@@ -122,10 +169,7 @@ Result<ExceptionHistory> read_exceptions(const std::string& path) {
 }
 
 Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history) {
-  Json entries = Json::array();
-  for (const ExceptionEntry& entry : history.entries) entries.push_back(to_json(entry));
-  const Json json{{"version", kVersion}, {"count", history.count}, {"exceptions", std::move(entries)}};
-  return replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  return replace_file(path, bounded_text(history));
 }
 
 Result<std::string> keep_exceptions(const std::string& path, std::span<const ExceptionEntry> found) {
@@ -136,7 +180,13 @@ Result<std::string> keep_exceptions(const std::string& path, std::span<const Exc
     history = ExceptionHistory{};
   }
   const ExceptionHistory before = *history;
-  for (const ExceptionEntry& entry : found) history->add(entry);
+  // Each against the file as it was: a new one may take the room of a known one, which would seem new then.
+  for (const ExceptionEntry& entry : found) {
+    if (holds(before, entry)) history->add(entry);
+  }
+  for (const ExceptionEntry& entry : found) {
+    if (!holds(before, entry) && !was_dropped(before, entry)) history->add(entry);
+  }
   if (*history == before) return remark;
   PLCHOST_TRY(write_exceptions(path, *history));
   return remark;

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -51,6 +53,20 @@ TEST_F(ExceptionHistoryTest, SaysThatTheBackTraceOfAProcessThatEndedIsNotKnown) 
   EXPECT_NE(made.back_trace_end, "");
 }
 
+// Its process knows no more of them: it walks the stack where a signal stopped the thread.
+TEST_F(ExceptionHistoryTest, SaysOfFaultsWithoutAStackThatThereIsNone) {
+  const std::string none = describe_end(BackTrace{});
+  const std::string lost = exception_entry({}, "/opt/line.so", "Fill").back_trace_end;
+  EXPECT_NE(lost, none);
+  FaultRecord record;
+  record.kind = FaultKind::cpp_exception;
+  EXPECT_EQ(exception_entry(record, "/opt/line.so", "Fill").back_trace_end, none);
+  record.kind = FaultKind::task_watchdog;
+  EXPECT_EQ(exception_entry(record, "/opt/line.so", "Fill").back_trace_end, none);
+  record.address = 0x7f12;
+  EXPECT_EQ(exception_entry(record, "/opt/line.so", "Fill").back_trace_end, lost);
+}
+
 // Of a version that had none.
 TEST_F(ExceptionHistoryTest, IsReadWithoutBackTraces) {
   write(R"({"version":1,"count":1,"exceptions":[{"number":1,"task":"Fill"}]})");
@@ -83,6 +99,101 @@ TEST_F(ExceptionHistoryTest, HasTheSameFaultOnceWhoeverFoundIt) {
   EXPECT_EQ(sut.count, 2U);
   EXPECT_EQ(sut.entries[0].symbol, "fill()+0x12");
   EXPECT_EQ(sut.entries[0].number, 1U);
+}
+
+// The manager wrote it first, and its process could go on.
+TEST_F(ExceptionHistoryTest, HasWhatItsProcessSaysOfAFaultWithoutASymbol) {
+  FaultRecord record;
+  record.unix_ns = 1000;
+  ExceptionHistory sut;
+  const ExceptionEntry of_manager = exception_entry(record, "/opt/line.so", "Fill");
+  sut.add(of_manager);
+  ExceptionEntry of_process = of_manager;
+  of_process.back_trace_end = "the stack is overwritten";
+  sut.add(of_process);
+  EXPECT_EQ(sut.entries[0].back_trace_end, "the stack is overwritten");
+  sut.add(of_manager);
+  EXPECT_EQ(sut.entries[0].back_trace_end, "the stack is overwritten");
+  of_process.back_trace = {"0x7f12"};
+  sut.add(of_process);
+  of_process.back_trace.clear();
+  sut.add(of_process);
+  EXPECT_THAT(sut.entries[0].back_trace, testing::ElementsAre("0x7f12"));
+  EXPECT_EQ(sut.count, 1U);
+}
+
+// The manager finds all faults of a process at its end, also those that are not kept any more.
+TEST_F(ExceptionHistoryTest, CountsNoFaultOfManyTwice) {
+  std::vector<ExceptionEntry> faults;
+  for (int i = 1; i <= 20; ++i) {
+    ExceptionEntry& fault = faults.emplace_back(entry("abort"));
+    fault.unix_ns = 1000 * i;
+    fault.symbol = "fill()+0x12";
+    EXPECT_EQ(keep_exceptions(path_, std::span(&fault, 1)), "");
+  }
+  const ExceptionHistory written = read_exceptions(path_).value();
+  EXPECT_EQ(written.count, 20U);
+  for (ExceptionEntry& fault : faults) {  // by the manager
+    fault.symbol = "";
+    fault.back_trace.clear();
+  }
+  EXPECT_EQ(keep_exceptions(path_, faults), "");
+  EXPECT_EQ(read_exceptions(path_).value(), written);
+}
+
+TEST_F(ExceptionHistoryTest, ReplacesNoKnownFaultByANewerOneAndThenAddsItAgain) {
+  std::vector<ExceptionEntry> faults;
+  for (int i = 1; i <= 20; ++i) {
+    faults.emplace_back(entry("abort")).unix_ns = 1000 * i;
+    if (i == 18) continue;
+    EXPECT_EQ(keep_exceptions(path_, std::span(&faults.back(), 1)), "");
+  }
+  std::swap(faults[0], faults[17]);  // a clock that was set back
+  EXPECT_EQ(keep_exceptions(path_, faults), "");
+  const ExceptionHistory kept = read_exceptions(path_).value();
+  EXPECT_EQ(kept.count, 20U);
+  EXPECT_EQ(kept.entries.back().unix_ns, 18'000);
+}
+
+// A clock without a battery, at a start.
+TEST_F(ExceptionHistoryTest, KeepsAFaultThatIsOlderThanThoseOfTheFuture) {
+  ExceptionEntry fault = entry("abort");
+  for (int i = 1; i <= 20; ++i) {
+    fault.unix_ns = std::numeric_limits<std::int64_t>::max() - 100 + i;
+    EXPECT_EQ(keep_exceptions(path_, std::span(&fault, 1)), "");
+  }
+  fault.unix_ns = 1000;
+  EXPECT_EQ(keep_exceptions(path_, std::span(&fault, 1)), "");
+  EXPECT_EQ(read_exceptions(path_)->count, 21U);
+  EXPECT_EQ(read_exceptions(path_)->entries.back().unix_ns, 1000);
+}
+
+TEST_F(ExceptionHistoryTest, DropsTheOldestBackTracesUntilItsReaderTakesIt) {
+  ExceptionHistory history;
+  for (int i = 1; i <= 16; ++i) {
+    ExceptionEntry fault = entry("abort");
+    fault.back_trace.assign(32, std::string(500, '"'));
+    history.add(fault);
+  }
+  ASSERT_TRUE(write_exceptions(path_, history));
+  const auto back = read_exceptions(path_);
+  ASSERT_TRUE(back) << back.error().describe();
+  EXPECT_EQ(back->count, 16U);
+  ASSERT_EQ(back->entries.size(), 16U);
+  EXPECT_TRUE(back->entries.front().back_trace.empty());
+  EXPECT_EQ(back->entries.front().back_trace_end, "it was dropped for those of newer exceptions");
+  EXPECT_EQ(back->entries.back(), history.entries.back());
+}
+
+TEST_F(ExceptionHistoryTest, DropsTheOldestEntriesUntilItsReaderTakesIt) {
+  ExceptionHistory history;
+  for (int i = 1; i <= 16; ++i) history.add(entry(std::string(100'000, 'x')));
+  ASSERT_TRUE(write_exceptions(path_, history));
+  const auto back = read_exceptions(path_);
+  ASSERT_TRUE(back) << back.error().describe();
+  EXPECT_EQ(back->count, 16U);
+  ASSERT_EQ(back->entries.size(), 2U);
+  EXPECT_EQ(back->entries.back().number, 16U);
 }
 
 TEST_F(ExceptionHistoryTest, IsKeptOnInTheFile) {
