@@ -79,8 +79,9 @@ Result<void> replace_file(const std::string& path, std::string_view text, mode_t
   }
   std::error_code error;
   std::filesystem::rename(fresh, path, error);
-  if (error) return failure(ErrorCode::system, "cannot rename " + fresh, error.value());
-  return {};
+  if (!error) return {};
+  ::unlink(fresh.c_str());
+  return failure(ErrorCode::system, "cannot rename " + fresh, error.value());
 }
 
 }  // namespace plchost

@@ -50,6 +50,13 @@ TEST_F(ReplaceFile, WhatCannotBeWrittenLeavesTheOldContents) {
   EXPECT_EQ(contents(), "kept");
 }
 
+TEST_F(ReplaceFile, WhatCannotBePutInItsPlaceLeavesNothingBeside) {
+  std::filesystem::create_directory(path);
+  EXPECT_FALSE(replace_file(path, "lost"));
+  EXPECT_TRUE(std::filesystem::is_directory(path));
+  EXPECT_FALSE(std::filesystem::exists(path + ".new"));
+}
+
 TEST_F(ReplaceFile, FoldersAreMadeWithTheirRightsAndThoseThatAreThereStayAsTheyAre) {
   namespace fs = std::filesystem;
   ASSERT_TRUE(make_synced_folders(directory + "/a/b/", 0700));
