@@ -1,12 +1,15 @@
 // The actions of an Instance when one of its tasks has a fault.
 
+#include <algorithm>
 #include <span>
-#include <utility>
+#include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "instances/runtime/application/symbol_name.hpp"
 #include "instances/runtime/instance/instance.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/exception_history.hpp"
 #include "shm/plc_process_image.h"
@@ -14,6 +17,18 @@
 namespace plchost {
 
 namespace {
+
+// The names of C++ templates have no bound. A cut one keeps its offset and its file, if they are short.
+constexpr std::size_t kMaxName = 255;
+
+std::string bounded(const std::string& name) {
+  constexpr std::string_view kCut = "...";
+  const std::size_t offset = std::min(name.rfind("+0x"), name.size());
+  const std::size_t tail = name.size() - offset;
+  if (name.size() <= kMaxName || tail > kMaxName / 2) return shortened(name, kMaxName);
+  const std::string_view head = cut(name, kMaxName - tail - kCut.size());
+  return fmt::format("{}{}{}", head, kCut, std::string_view(name).substr(offset));
+}
 
 ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& application) {
   const FaultRecord& record = fault.record;
@@ -24,10 +39,11 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
   if (entry.symbol.empty() && record.caller != 0) {
     entry.symbol = fmt::format("no code; called from {}", names.at(record.caller));
   }
+  entry.symbol = bounded(entry.symbol);
   for (std::size_t i = 0; i < fault.back_trace.count; ++i) {
     const std::uint64_t address = fault.back_trace.addresses[i];
-    std::string name = names.at(address, i > 0);
-    entry.back_trace.push_back(name.empty() ? fmt::format("{:#x}", address) : std::move(name));
+    const std::string name = names.at(address, i > 0);
+    entry.back_trace.push_back(name.empty() ? fmt::format("{:#x}", address) : bounded(name));
   }
   entry.back_trace_end = describe_end(fault.back_trace);
   return entry;

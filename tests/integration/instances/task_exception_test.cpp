@@ -151,6 +151,7 @@ TEST_P(BackTraceOf, AFaultNamesTheFunctionsThatLedToIt) {
   const ExceptionEntry found = sut.exceptions().front();
   std::vector<std::string> own;
   for (const std::string& function : found.back_trace) {
+    EXPECT_LE(function.size(), 255U);
     if (function.find("task_faults.so") != std::string::npos) own.push_back(function);
   }
   const std::vector<std::string>& expected = GetParam().functions;
@@ -162,6 +163,7 @@ TEST_P(BackTraceOf, AFaultNamesTheFunctionsThatLedToIt) {
 
 const std::vector<Trace> kTraces = {
     {"nested", {"innermost()+0x", "middle()+0x", "outermost()+0x"}, ""},
+    {"long_name", {"innermost()+0x", "...+0x"}, ""},
     {"recurse", std::vector<std::string>(32, "recurse(int)+0x"), "only the innermost 32 functions are known"},
     {"alloca", {"overflow_at_once()+0x"}, ""},
     {"abort", {"setup(plc::Application&)"}, ""},

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <alloca.h>
 #include <pthread.h>
@@ -56,6 +57,12 @@ __attribute__((noinline)) void middle() {
 __attribute__((noinline)) void outermost() {
   middle();
   sink = 2;
+}
+// Its name has more than 500 bytes.
+template <int... Numbers>
+__attribute__((noinline)) void call_long_name(std::integer_sequence<int, Numbers...> /*unused*/) {
+  innermost();
+  sink = 4;
 }
 // Writes over its own return address, by one where no code is, and has a fault then.
 __attribute__((noinline)) void smash_stack() {
@@ -163,6 +170,10 @@ void setup(plc::Application& app) {
   app.external("Nested", 4, "nested", [] {
     outermost();
     sink = 3;
+  });
+  app.external("LongName", 4, "long_name", [] {
+    call_long_name(std::make_integer_sequence<int, 200>());
+    sink = 5;
   });
   app.external("SmashStack", 4, "smash_stack", smash_stack);
   app.external("LoseFrame", 4, "lose_frame", lose_frame);
