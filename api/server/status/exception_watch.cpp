@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <string>
-#include <vector>
 
 #include <code_words.hpp>
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include "api/dds/field_info.hpp"
@@ -15,15 +15,20 @@ namespace plchost {
 
 namespace {
 
-// As many whole lines as there is room for.
-std::string lines_of(const std::vector<std::string>& functions, std::size_t most) {
+// As many whole lines as there is room for. If some are left out, the end says so.
+void show_back_trace(plc_ExceptionStatus& sample, const ExceptionEntry& entry) {
+  constexpr std::size_t kMost = sizeof sample.back_trace - 1;
   std::string lines;
-  for (const std::string& function : functions) {
-    if (lines.size() + 1 + function.size() > most) break;
-    if (!lines.empty()) lines += '\n';
+  std::size_t count = 0;
+  for (const std::string& function : entry.back_trace) {
+    if (lines.size() + 1 + function.size() > kMost) break;
+    if (count++ > 0) lines += '\n';
     lines += function;
   }
-  return lines;
+  dds::copy_text(sample.back_trace, lines);
+  dds::copy_text(sample.back_trace_end, count == entry.back_trace.size()
+                                            ? entry.back_trace_end
+                                            : fmt::format("only the innermost {} functions fit", count));
 }
 
 }  // namespace
@@ -94,8 +99,7 @@ void ExceptionWatch::show(plc_ExceptionStatus& sample, const ExceptionHistory& h
   sample.memory_address = last.memory_address;
   dds::copy_text(sample.text, last.text);
   dds::copy_text(sample.application, last.application);
-  dds::copy_text(sample.back_trace, lines_of(last.back_trace, sizeof sample.back_trace - 1));
-  dds::copy_text(sample.back_trace_end, last.back_trace_end);
+  show_back_trace(sample, last);
 }
 
 }  // namespace plchost

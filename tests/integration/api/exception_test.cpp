@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -192,8 +193,9 @@ TEST_F(ExceptionOfAnInstance, HasAsManyWholeFunctionsAsThereIsRoomFor) {
   history.add(entry);
   ASSERT_TRUE(write_exceptions(path(), history));
   ASSERT_TRUE(eventually_shown(1));
-  const std::string lines = shown("line1")->back_trace;
-  EXPECT_EQ(lines.size(), 10 * 401U - 1);
+  const auto seen = shown("line1").value();
+  EXPECT_EQ(std::string(seen.back_trace).size(), 10 * 401U - 1);
+  EXPECT_STREQ(seen.back_trace_end, "only the innermost 10 functions fit");
 }
 
 TEST_F(ExceptionOfAnInstance, IsInTheReport) {
@@ -226,6 +228,38 @@ TEST_F(ExceptionOfAnInstance, IsInTheReport) {
   EXPECT_EQ(unknown.code, 1);
   EXPECT_THAT(unknown.errors, HasSubstr("no instance 'line3'"));
   EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+TEST_F(ExceptionOfAnInstance, IsInNoReportInPlaceOfWhatIsNoPlainFile) {
+  namespace fs = std::filesystem;
+  const std::string folder = path() + ".reports";
+  fs::create_directory(folder);
+  const std::string file = folder + "/report";
+  std::ofstream(file + ".new") << "the user's own";
+  const auto save = [&] { return run({"--timeout", "2", "save", "report", "line1", file}); };
+  EXPECT_EQ(save().code, 0);
+  EXPECT_EQ(save().code, 0) << "an earlier report is replaced";
+  EXPECT_EQ(fs::file_size(file + ".new"), 14U);
+  fs::remove(file + ".new");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
+  const auto refused = [&] {
+    const auto saved = save();
+    EXPECT_EQ(saved.code, 1);
+    EXPECT_THAT(saved.errors, AllOf(HasSubstr(file), HasSubstr("is no plain file")));
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1);
+  };
+  fs::remove(file);
+  fs::create_symlink("/dev/null", file);
+  refused();
+  EXPECT_TRUE(fs::is_symlink(file));
+  fs::remove(file);
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  refused();
+  EXPECT_TRUE(fs::is_fifo(file));
+  fs::remove(file);
+  fs::create_directory(file);
+  refused();
+  fs::remove_all(folder);
 }
 
 TEST_F(ExceptionOfAnInstance, ThatNeverWasIsNoErrorButAnUnknownInstanceIs) {
