@@ -1,10 +1,17 @@
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/host_rows.hpp"
@@ -16,6 +23,7 @@
 #include "api/client/log_reader.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/unique_fd.hpp"
 #include "shm/files/replace_file.hpp"
 
 namespace plchost {
@@ -112,6 +120,25 @@ class Report {
   std::vector<std::string> parts_missing_;
 };
 
+/// The user names it. A link, a folder or a device stays as it is, and so does the user's own "FILE.new".
+Result<void> write_for_owner(const std::string& file, std::string_view text) {
+  struct stat status{};
+  if (::lstat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    return failure(
+        ErrorCode::wrong_type,
+        fmt::format("{} is no plain file: name a plain file, or one that is not there", printable(file)));
+  }
+  std::string fresh = file + ".XXXXXX";
+  if (const UniqueFd made(::mkostemp(fresh.data(), O_CLOEXEC)); !made)
+    return failure(ErrorCode::system, fmt::format("cannot make a file beside {}", printable(file)), errno);
+  constexpr mode_t kForOwner = 0600;  // the lines of the log are the application's
+  auto written = write_whole_file(fresh, text, kForOwner);
+  if (written && ::rename(fresh.c_str(), file.c_str()) != 0)
+    written = failure(ErrorCode::system, fmt::format("cannot replace {}", printable(file)), errno);
+  if (!written) ::unlink(fresh.c_str());
+  return written;
+}
+
 int save_report(CliSession& session, const std::string& instance, const std::string& file,
                 const std::string& version) {
   auto host = session.target_host();
@@ -119,10 +146,8 @@ int save_report(CliSession& session, const std::string& instance, const std::str
   Report report(session, *std::move(host), instance);
   const auto made = report.make(version);
   if (!made) return CliSession::fail(made.error());
-  constexpr mode_t kForOwner = 0600;  // the lines of the log are the application's
   const std::string text = made->dump(2, ' ', true, Row::error_handler_t::replace) + "\n";
-  if (const auto written = replace_file(file, text, kForOwner); !written)
-    return CliSession::fail(written.error());
+  if (const auto written = write_for_owner(file, text); !written) return CliSession::fail(written.error());
   for (const std::string& part : report.parts_missing()) {
     session.say(printable(fmt::format("{} has not all: {}", file, part)));
   }
