@@ -49,6 +49,13 @@ constexpr std::array kFixWords = {std::pair{std::string_view("print"), FixMode::
                                   std::pair{std::string_view("apply"), FixMode::apply},
                                   std::pair{std::string_view("revert"), FixMode::revert}};
 
+// An empty variable of a script must not make an order about an image one about this machine.
+std::string check_root(const std::string& folder) {
+  std::error_code ignored;
+  if (!folder.empty() && !std::filesystem::equivalent(folder, "/", ignored)) return {};
+  return fmt::format("'{}' names this machine; leave it out", folder);
+}
+
 void describe(CLI::App& app, Options& options) {
   app.set_version_flag("--version", PLCHOST_VERSION);
   auto* config = app.add_option(
@@ -70,6 +77,7 @@ void describe(CLI::App& app, Options& options) {
   fix->excludes(check);
   app.add_option("--root", options.root,
                  "With --fix-host: the folder of an image, where files are written and nothing is run")
+      ->check(check_root)
       ->check(CLI::ExistingDirectory)
       ->needs(fix);
   std::string footer =

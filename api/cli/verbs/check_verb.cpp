@@ -2,6 +2,7 @@
 #include <array>
 #include <cerrno>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -75,7 +76,7 @@ struct CheckOrder {
   bool apply = false;
   bool revert = false;
   std::string config;
-  std::string root;
+  std::optional<std::string> root;
 };
 
 int wrong_use(std::string_view text) {
@@ -95,7 +96,8 @@ int fix_host(const CliOptions& options, const CheckOrder& order) {
   const char* const mode = order.apply ? "apply" : order.revert ? "revert" : "print";
   std::vector<const char*> words = {program.c_str(), "--fix-host", mode};
   if (!order.config.empty()) words.insert(words.end(), {"--config", order.config.c_str()});
-  if (!order.root.empty()) words.insert(words.end(), {"--root", order.root.c_str()});
+  // Also an empty one: plchostd refuses it. Without it the order would be about this machine.
+  if (order.root) words.insert(words.end(), {"--root", order.root->c_str()});
   words.push_back(nullptr);
   ::execv(program.c_str(), const_cast<char* const*>(words.data()));
   return CliSession::fail({ErrorCode::system, errno, "--fix works on a controller only: " + program});
@@ -103,7 +105,7 @@ int fix_host(const CliOptions& options, const CheckOrder& order) {
 
 int check(CliSession& session, const CheckOrder& order) {
   if (order.fix) return fix_host(session.options, order);
-  if (order.apply || order.revert || !order.config.empty() || !order.root.empty())
+  if (order.apply || order.revert || !order.config.empty() || order.root)
     return wrong_use("--apply, --revert, --config and --root need --fix");
   return check_host(session, order.all);
 }
@@ -123,7 +125,7 @@ void add_check_verb(const Command& plcctl, CliSession& session) {
       .flag("--revert", order->revert, "with --fix: remove these files (as root)")
       .option("--config", order->config,
               "with --fix: the configuration of the manager (else /etc/plchost/plchost.toml)", "")
-      .option("--root", order->root, "with --fix: the folder of an image, where nothing is run", "");
+      .option("--root", order->root, "with --fix: the folder of an image, where nothing is run");
 }
 
 }  // namespace plchost

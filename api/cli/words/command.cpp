@@ -92,6 +92,13 @@ const Command& Command::file(const char* name, std::string& value, const char* t
   return *this;
 }
 
+const Command& Command::option(const char* name, std::optional<std::string>& value, const char* text) const {
+  app_->add_option_function<std::string>(
+          name, [&value](const std::string& given) { value = given; }, text)
+      ->take_last();
+  return *this;
+}
+
 const Command& Command::option(const char* name, std::string& value, const char* text,
                                const char* variable) const {
   app_->add_option(name, value, text)->envname(variable)->take_last();

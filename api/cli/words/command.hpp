@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,8 @@ class Command {
   const Command& file(const char* name, std::string& value, const char* text) const;
   /// A text, which a variable of the environment can stand for.
   const Command& option(const char* name, std::string& value, const char* text, const char* variable) const;
+  /// Without the option: nothing. An empty text is a value.
+  const Command& option(const char* name, std::optional<std::string>& value, const char* text) const;
   /// One of several words, "--name=WORD". `name`: "--name{WORD}", where WORD is what "--name" alone stands
   /// for.
   const Command& choice(const char* name, std::string& value, const char* text,
