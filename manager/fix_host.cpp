@@ -5,9 +5,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <optional>
 #include <sstream>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -26,16 +28,25 @@ namespace {
 
 using State = PlanFiles::State;
 
-// Nothing of the caller's environment: root runs these.
 constexpr auto kPath = "/usr/sbin:/usr/bin:/sbin:/bin";
 constexpr std::array kProgramFolders = {"/usr/sbin/", "/usr/bin/", "/sbin/", "/bin/"};
+constexpr auto kUpdateGrub = "update-grub";
+constexpr auto kGrubConfig = "/boot/grub/grub.cfg";
+constexpr auto kFirstEnvironment = "/proc/1/environ";
 constexpr std::array kContainerMarks = {"/run/systemd/container", "/run/.containerenv", "/.dockerenv"};
 
 using Words = std::vector<std::string>;
 
+// Also if nobody can read it: the work goes on, and fix_host() looks at the stream at the end.
+template <typename... Parts>
+void say(fmt::format_string<Parts...> form, Parts&&... parts) {
+  const std::string text = fmt::format(form, std::forward<Parts>(parts)...);
+  (void)std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
 bool fail(const std::string& text) {
   (void)std::fflush(stdout);
-  fmt::print(stderr, "plchostd: {}\n", text);
+  (void)std::fputs(("plchostd: " + text + "\n").c_str(), stderr);
   return false;
 }
 
@@ -62,6 +73,8 @@ Result<ExitStatus> run(Words command, const std::string& path) {
 
 // True: none of them has failed. One that is not here has nothing to do.
 bool run_all(const std::vector<Words>& commands) {
+  // Nothing of the caller's environment: root runs these.
+  ::clearenv();
   ::setenv("PATH", kPath, 1);
   const bool systemd = HostFiles().exists("/run/systemd/system");
   bool good = true;
@@ -69,13 +82,13 @@ bool run_all(const std::vector<Words>& commands) {
     const std::string shown = fmt::format("{}", fmt::join(command, " "));
     const auto path = program_path(command.front());
     if (!path || (needs_systemd(command) && !systemd)) {
-      fmt::print("not run: {}: {}\n", shown, path ? "systemd does not run" : "there is no such program");
+      say("not run: {}: {}\n", shown, path ? "systemd does not run" : "there is no such program");
       continue;
     }
     (void)std::fflush(stdout);
     const auto ended = run(command, *path);
     if (ended && ended->success()) {
-      fmt::print("ran: {}\n", shown);
+      say("ran: {}\n", shown);
     } else {
       good = fail(fmt::format("{}: {}", shown, ended ? ended->describe() : ended.error().describe()));
     }
@@ -92,21 +105,20 @@ std::vector<Words> commands_to_reload(const HostFiles& written) {
 }
 
 // The program of systemd, as sysctl fails for each setting that the kernel does not have.
-std::vector<Words> commands_to_apply(const PlanFacts& facts, const HostFiles& written) {
+std::vector<Words> commands_to_apply(const HostFiles& written) {
   auto commands = commands_to_reload(written);
   commands.push_back({"systemctl", "restart", kPlanUnit});
   commands.push_back({"/lib/systemd/systemd-sysctl", place_of(PlanPart::sysctl).path});
-  if (facts.has_grub) commands.push_back({"update-grub"});
   return commands;
 }
 
 void print_commands(const std::vector<Words>& commands, std::string_view when) {
-  for (const Words& command : commands) fmt::print("{}: {}\n", when, fmt::join(command, " "));
+  for (const Words& command : commands) say("{}: {}\n", when, fmt::join(command, " "));
 }
 
 void print_text(const std::string& text) {
   std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) fmt::print("    {}\n", line);
+  for (std::string line; std::getline(lines, line);) say("    {}\n", line);
 }
 
 // Each finding that is not good: the files that mend it, or the reason that none does.
@@ -122,10 +134,45 @@ void print_fixes(const CheckedHost& host, bool has_grub) {
       const bool by_hand = path == place_of(PlanPart::grub).path && !has_grub;
       by += fmt::format("{}{}", by.empty() ? "" : " and ", by_hand ? "the command line of the kernel" : path);
     }
-    fmt::print("{:<19} {}: {}\n", finding.id, by.empty() ? "no file of plchost changes it" : by, fix.text);
+    say("{:<19} {}: {}\n", finding.id, by.empty() ? "no file of plchost changes it" : by, fix.text);
   }
-  fmt::print("not looked at: {}: plchostd.service gives the manager its rights, see 'plcctl check host'\n",
-             of_manager);
+  say("not looked at: {}: plchostd.service gives the manager its rights, see 'plcctl check host'\n",
+      of_manager);
+}
+
+std::unexpected<Error> unreadable_of_grub(const std::string& root, const Error& error) {
+  return failure(ErrorCode::refused,
+                 fmt::format("cannot read what grub reads: {}{}", root, error.describe()));
+}
+
+// The files of others that grub reads, too.
+Result<void> look_at_grub(const HostFiles& written, const std::string& root) {
+  const std::string own = place_of(PlanPart::grub).path;
+  std::vector<std::string> others = {"/etc/default/grub"};
+  const auto names = written.names("/etc/default/grub.d");
+  if (!names && names.error().code != ErrorCode::not_found) return unreadable_of_grub(root, names.error());
+  for (const std::string& name : names.value_or(std::vector<std::string>())) {
+    const std::string path = "/etc/default/grub.d/" + name;
+    if (path.ends_with(".cfg") && path != own) others.push_back(path);
+  }
+  for (const std::string& path : others) {
+    const auto text = written.text(path);
+    if (!text && text.error().code == ErrorCode::not_found) continue;
+    if (!text) return unreadable_of_grub(root, text.error());
+    if (const auto words = words_that_clash(*text); !words.empty()) {
+      return failure(ErrorCode::refused,
+                     fmt::format("{}{} has {} too, and the kernel would not take both; take it out there",
+                                 root, path, fmt::join(words, " ")));
+    }
+    // The shell of grub-mkconfig sorts by bytes.
+    if (path > own && replaces_command_line(*text)) {
+      return failure(ErrorCode::refused,
+                     fmt::format("{}{} sets GRUB_CMDLINE_LINUX_DEFAULT after plchost.cfg and drops its "
+                                 "words; put $GRUB_CMDLINE_LINUX_DEFAULT into the value there",
+                                 root, path));
+    }
+  }
+  return {};
 }
 
 // The first reason for which nothing may be written.
@@ -137,18 +184,7 @@ Result<std::vector<State>> look(const PlanFiles& files, const HostPlan& plan, co
     states.push_back(state);
   }
   if (plan.files.front().part != PlanPart::grub) return states;
-  std::vector<std::string> others = {"/etc/default/grub"};
-  for (const std::string& name : written.names("/etc/default/grub.d").value_or(std::vector<std::string>())) {
-    const std::string path = "/etc/default/grub.d/" + name;
-    if (path.ends_with(".cfg") && path != place_of(PlanPart::grub).path) others.push_back(path);
-  }
-  for (const std::string& path : others) {
-    const auto words = words_that_clash(written.text(path).value_or(""));
-    if (words.empty()) continue;
-    return failure(ErrorCode::refused,
-                   fmt::format("{}{} has {} too, and the kernel would not take both; take it out there", root,
-                               path, fmt::join(words, " ")));
-  }
+  PLCHOST_TRY(look_at_grub(written, root));
   return states;
 }
 
@@ -166,15 +202,52 @@ bool runs_with(const std::string& words) {
   return true;
 }
 
+void print_by_hand(std::string_view why, const HostPlan& plan) {
+  say("by hand: {}: let the boot loader give the kernel: {}\n", why, plan.kernel_words);
+}
+
 void print_kernel_words(const HostPlan& plan, const FixOrder& order, bool has_grub) {
   if (order.root.empty() && runs_with(plan.kernel_words)) {
-    fmt::print("the kernel runs with these words: {}\n", plan.kernel_words);
+    say("the kernel runs with these words: {}\n", plan.kernel_words);
   } else if (!has_grub) {
-    fmt::print("by hand: there is no grub: let the boot loader give the kernel: {}\n", plan.kernel_words);
+    print_by_hand("there is no update-grub", plan);
   } else {
-    fmt::print("{}: {}\n", order.root.empty() ? "with a reboot" : "at the boot of the image",
-               plan.kernel_words);
+    say("after update-grub, {}: {}\n", order.root.empty() ? "with a reboot" : "at the boot of the image",
+        plan.kernel_words);
   }
+}
+
+// A line as "linux /vmlinuz root=/dev/sda1 ro quiet isolcpus=..." of any entry. The file may be longer than
+// HostFiles reads.
+bool grub_gives(const std::string& words) {
+  std::ifstream file(kGrubConfig);
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t start = line.find_first_not_of(" \t");
+    if (start == std::string::npos || !line.substr(start).starts_with("linux")) continue;
+    if ((line + " ").find(" " + words + " ") != std::string::npos) return true;
+  }
+  return false;
+}
+
+// False: the next boot does not give the kernel its words, although there is grub.
+bool boot_with_words(const HostPlan& plan, const FixOrder& order) {
+  if (!run_all({{kUpdateGrub}})) {
+    print_by_hand("update-grub has failed", plan);
+    return false;
+  }
+  if (!grub_gives(plan.kernel_words)) {
+    print_by_hand("grub does not do it", plan);
+    return fail(
+        fmt::format("after update-grub {} does not have these words; look in /etc/default/grub and "
+                    "grub.d for a file that changes GRUB_CMDLINE_LINUX_DEFAULT",
+                    kGrubConfig));
+  }
+  if (runs_with(plan.kernel_words)) {
+    print_kernel_words(plan, order, true);
+  } else {
+    say("with a reboot: {}\n", plan.kernel_words);
+  }
+  return true;
 }
 
 bool apply(const FixOrder& order, const HostPlan& plan, const std::vector<State>& states,
@@ -186,23 +259,26 @@ bool apply(const FixOrder& order, const HostPlan& plan, const std::vector<State>
       if (const auto written = files.write(plan.files[i]); !written)
         return fail(written.error().describe() + "; the files above are written, --apply goes on there");
     }
-    fmt::print("{}: {}\n", states[i] == State::same ? "is there" : "written", path);
+    say("{}: {}\n", states[i] == State::same ? "is there" : "written", path);
   }
-  const auto commands = commands_to_apply(facts, HostFiles(order.root));
-  bool good = true;
+  const auto commands = commands_to_apply(HostFiles(order.root));
   if (order.root.empty()) {
-    good = run_all(commands);
-  } else {
-    print_commands(commands, "to run in it");
+    const bool good = run_all(commands);
+    if (facts.has_grub) return boot_with_words(plan, order) && good;
+    print_kernel_words(plan, order, false);
+    return good;
   }
+  if (::geteuid() != 0)
+    say("to do in it: the files belong to user {}: make them root's, with chown root:root\n", ::geteuid());
+  print_commands(commands, "to run in it");
+  if (facts.has_grub) print_commands({{kUpdateGrub}}, "to run in it");
   print_kernel_words(plan, order, facts.has_grub);
-  return good;
+  return true;
 }
 
 bool revert(const FixOrder& order) {
   const PlanFiles files(order.root);
   bool good = true;
-  bool grub = false;
   bool any = false;
   // As long as it has its file: it may not be loaded yet.
   const auto unit = files.state({PlanPart::unit, {}});
@@ -213,50 +289,47 @@ bool revert(const FixOrder& order) {
     const auto removed = files.remove(part);
     if (!removed) good = fail("left as it is: " + removed.error().describe());
     if (!removed || !*removed) continue;
-    fmt::print("removed: {}{}\n", order.root, kPlanPlaces[i].path);
+    say("removed: {}{}\n", order.root, kPlanPlaces[i].path);
     any = true;
-    grub = grub || part == PlanPart::grub;
   }
-  if (!any) {
-    fmt::print("plchost has no file here\n");
-    return good;
-  }
-  auto commands = commands_to_reload(HostFiles(order.root));
-  if (grub) commands.push_back({"update-grub"});
-  if (order.root.empty()) {
-    good = run_all(commands) && good;
-  } else {
+  if (!any) say("plchost has no file here\n");
+  // Also without a file: one before may have been cut here.
+  const HostFiles written(order.root);
+  auto commands = commands_to_reload(written);
+  if (has_update_grub(written)) commands.push_back({kUpdateGrub});
+  if (!order.root.empty()) {
     print_commands(commands, "to run in it");
+  } else if (!run_all(commands)) {
+    return fail("the files are removed, but not all programs have run well; --revert again runs them anew");
   }
-  fmt::print(
-      "with a reboot: the command line of the kernel, sysctl, interrupts, work queues, huge pages and "
+  say("with a reboot: the command line of the kernel, sysctl, interrupts, work queues, huge pages and "
       "governors are as they were; until then all of them stay\n");
   return good;
 }
 
-std::string container_mark(const HostFiles& files) {
+// By the environment of its first process: a folder of an image may have the /proc of the machine that builds
+// it.
+bool container_by_environment() {
+  std::ifstream file(kFirstEnvironment, std::ios::binary);
+  for (std::string word; std::getline(file, word, '\0');) {
+    if (word.starts_with("container=")) return true;
+  }
+  return false;
+}
+
+std::string container_mark(const FixOrder& order) {
+  const HostFiles files(order.root);
   for (const char* const mark : kContainerMarks) {
     if (files.exists(mark)) return mark;
   }
-  return {};
+  return order.root.empty() && container_by_environment() ? kFirstEnvironment : "";
 }
 
-}  // namespace
-
-HostFiles facts_below(const std::string& root) {
-  return HostFiles(HostFiles(root).exists("/sys/devices/system/cpu/online") ? root : std::string());
-}
-
-Result<void> may_fix_host(const FixOrder& order) {
-  if (order.mode == FixMode::print || !order.root.empty() || ::geteuid() == 0) return {};
-  return failure(ErrorCode::refused, "only root may write in /etc: run it as root, or with sudo");
-}
-
-bool fix_host(const FixOrder& order, const ManagerConfig& config) {
+bool do_order(const FixOrder& order, const ManagerConfig& config) {
   const bool writes = order.mode != FixMode::print;
   const HostFiles written(order.root);
   if (order.mode == FixMode::revert) return revert(order);
-  const std::string mark = container_mark(written);
+  const std::string mark = container_mark(order);
   if (writes && !mark.empty()) {
     return fail(fmt::format("{}{} says that this is a container: its kernel is set up outside, on the host",
                             order.root, mark));
@@ -269,25 +342,43 @@ bool fix_host(const FixOrder& order, const ManagerConfig& config) {
   if (!plan) return fail(plan.error().describe());
   const PlanFiles files(order.root);
   const auto states = look(files, *plan, written, order.root);
-  fmt::print("{}; cores {} for all the rest\n", host_check::name_cores(host, host_check::plc_cores(host)),
-             format_cpu_list(plan->housekeeping));
+  say("{}; cores {} for all the rest\n", host_check::name_cores(host, host_check::plc_cores(host)),
+      format_cpu_list(plan->housekeeping));
   if (!states) return fail(states.error().describe());
   if (writes) return apply(order, *plan, *states, *facts);
   for (std::size_t i = 0; i < plan->files.size(); ++i) {
     const PlannedFile& file = plan->files[i];
-    fmt::print("{}: {}{}\n", word_of((*states)[i]), order.root, place_of(file.part).path);
+    say("{}: {}{}\n", word_of((*states)[i]), order.root, place_of(file.part).path);
     if ((*states)[i] != State::same) print_text(file.text);
   }
   print_fixes(host, facts->has_grub);
-  print_commands(commands_to_apply(*facts, written), "to run");
+  print_commands(commands_to_apply(written), "to run");
+  if (facts->has_grub) print_commands({{kUpdateGrub}}, "to run");
   print_kernel_words(*plan, order, facts->has_grub);
   if (!mark.empty()) {
-    fmt::print("{}{} says that this is a container: all of this has to be done outside, on the host\n",
-               order.root, mark);
+    say("{}{} says that this is a container: all of this has to be done outside, on the host\n", order.root,
+        mark);
   } else if (order.root.empty() && ::geteuid() != 0) {
-    fmt::print("--apply does it, and needs root\n");
+    say("--apply does it, and needs root\n");
   }
   return true;
+}
+
+}  // namespace
+
+Result<void> may_fix_host(const FixOrder& order) {
+  if (order.mode == FixMode::print || !order.root.empty() || ::geteuid() == 0) return {};
+  return failure(ErrorCode::refused, "only root may write in /etc: run it as root, or with sudo");
+}
+
+HostFiles facts_below(const std::string& root) {
+  return HostFiles(HostFiles(root).exists("/sys/devices/system/cpu/online") ? root : std::string());
+}
+
+bool fix_host(const FixOrder& order, const ManagerConfig& config) {
+  const bool done = do_order(order, config);
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return done;
+  return fail("cannot write to the standard output");
 }
 
 }  // namespace plchost

@@ -78,6 +78,8 @@ std::string unit_text(const HostPlan& plan) {
   for (const int core : plan.isolated) cores += fmt::format(" {}", core);
   const std::string list = format_cpu_list(plan.housekeeping);
   const std::string mask = format_cpu_mask(plan.housekeeping);
+  // Without [Install]: the plan has its own link, and 'systemctl enable' would replace it by one of another
+  // form.
   // "$$" is systemd's form of "$". Parts that a kernel lacks, and interrupts that it does not let move, are
   // no errors.
   return fmt::format(R"([Unit]
@@ -93,11 +95,8 @@ RemainAfterExit=yes
 ExecStart=-/bin/sh -c 'exec 2>/dev/null; echo {mask} >/proc/irq/default_smp_affinity'
 ExecStart=-/bin/sh -c 'exec 2>/dev/null; for file in /proc/irq/*/smp_affinity_list; do echo {list} >"$$file"; done'
 ExecStart=-/bin/sh -c 'exec 2>/dev/null; echo {mask} >/sys/devices/virtual/workqueue/cpumask'
-ExecStart=-/bin/sh -c 'exec 2>/dev/null; echo madvise >/sys/kernel/mm/transparent_hugepage/enabled'
+ExecStart=-/bin/sh -c 'exec 2>/dev/null; cd /sys/kernel/mm/transparent_hugepage; grep -qF "[always]" enabled && echo madvise >enabled'
 ExecStart=-/bin/sh -c 'exec 2>/dev/null; for core in{cores}; do echo performance >/sys/devices/system/cpu/cpu$$core/cpufreq/scaling_governor; done'
-
-[Install]
-WantedBy=multi-user.target
 )",
                      fmt::arg("mask", mask), fmt::arg("list", list), fmt::arg("cores", cores));
 }
@@ -120,6 +119,10 @@ std::string names_on(const PlanFacts& facts, int core) {
 
 }  // namespace
 
+bool has_update_grub(const HostFiles& written) {
+  return written.exists("/usr/sbin/update-grub");
+}
+
 Result<PlanFacts> plan_facts(const CheckedHost& host, const HostFiles& written) {
   PLCHOST_TRY_ASSIGN(auto online, host.files.cores("/sys/devices/system/cpu/online"));
   PlanFacts facts{.instances = host.instances, .online = std::move(online)};
@@ -129,7 +132,7 @@ Result<PlanFacts> plan_facts(const CheckedHost& host, const HostFiles& written) 
     if (together) facts.siblings.insert(facts.siblings.end(), together->begin(), together->end());
   }
   facts.siblings = each_once(std::move(facts.siblings));
-  facts.has_grub = written.exists("/etc/default/grub") || written.exists("/usr/sbin/update-grub");
+  facts.has_grub = has_update_grub(written);
   return facts;
 }
 
@@ -190,6 +193,21 @@ std::vector<std::string> words_that_clash(std::string_view file) {
     }
   }
   return found;
+}
+
+bool replaces_command_line(std::string_view file) {
+  constexpr std::string_view kVariable = "GRUB_CMDLINE_LINUX_DEFAULT";
+  std::istringstream lines{std::string(file)};
+  for (std::string line; std::getline(lines, line);) {
+    std::string_view rest = line;
+    rest.remove_prefix(std::min(rest.find_first_not_of(" \t"), rest.size()));
+    if (rest.starts_with("export ")) rest.remove_prefix(std::string_view("export ").size());
+    if (!rest.starts_with(fmt::format("{}=", kVariable))) continue;
+    const bool kept = rest.find(fmt::format("${}", kVariable)) != std::string_view::npos ||
+                      rest.find(fmt::format("${{{}", kVariable)) != std::string_view::npos;
+    if (!kept) return true;
+  }
+  return false;
 }
 
 }  // namespace plchost

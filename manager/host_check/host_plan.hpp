@@ -42,8 +42,10 @@ struct PlanFacts {
   std::vector<CheckedHost::Instance> instances = {};
   std::vector<int> online = {};    ///< cores, ascending
   std::vector<int> siblings = {};  ///< of the instances' cores, by hyper-threading
-  bool has_grub = false;
+  bool has_grub = false;           ///< its update-grub is there
 };
+/// The program that puts the file for grub to use is there. `written`: the tree that the files are for.
+[[nodiscard]] bool has_update_grub(const HostFiles& written);
 /// `written`: the tree that the files of the plan are for. refused, not_found, corrupt: the cores that are on
 /// line cannot be read.
 [[nodiscard]] Result<PlanFacts> plan_facts(const CheckedHost& host, const HostFiles& written);
@@ -76,5 +78,8 @@ struct Fix {
 /// The words of another's file that set the same on the kernel's command line, as "isolcpus=": the kernel
 /// takes the first of them, or none.
 [[nodiscard]] std::vector<std::string> words_that_clash(std::string_view file);
+
+/// A file that grub reads after that of the plan sets the kernel's command line without its value before.
+[[nodiscard]] bool replaces_command_line(std::string_view file);
 
 }  // namespace plchost

@@ -73,6 +73,8 @@ Result<std::string> target_of(int folder, const std::string& name, const std::st
 Result<PlanFiles::Way> PlanFiles::way_to(PlanPart part, bool make) const {
   const std::string path = place_of(part).path;
   std::string shown = root_;
+  UniqueFd above;
+  std::string folder_name;
   UniqueFd folder(::open(root_.empty() ? "/" : root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!folder) return failure(ErrorCode::system, "cannot open folder " + root_, errno);
   const std::size_t last = path.rfind('/');
@@ -93,12 +95,18 @@ Result<PlanFiles::Way> PlanFiles::way_to(PlanPart part, bool make) const {
     if (!next && (errno == ENOTDIR || errno == ELOOP))
       return of_another(shown, "a file or a symbolic link, where a folder has to be");
     if (!next) return failure(ErrorCode::system, "cannot open folder " + shown, errno);
+    above = std::move(folder);
+    folder_name = name;
     folder = std::move(next);
   }
-  return Way{.folder = std::move(folder), .name = path.substr(last + 1), .shown = root_ + path};
+  return Way{.above = std::move(above),
+             .folder_name = std::move(folder_name),
+             .folder = std::move(folder),
+             .name = path.substr(last + 1),
+             .shown = root_ + path};
 }
 
-Result<PlanFiles::State> PlanFiles::look(const Way& way, const PlannedFile& file) {
+Result<PlanFiles::State> PlanFiles::look(const Way& way, const PlannedFile& file) const {
   struct stat found{};
   if (!way.folder) return State::missing;
   if (::fstatat(way.folder.get(), way.name.c_str(), &found, AT_SYMLINK_NOFOLLOW) != 0) {
@@ -108,8 +116,10 @@ Result<PlanFiles::State> PlanFiles::look(const Way& way, const PlannedFile& file
   if (const std::string_view wanted = place_of(file.part).link; !wanted.empty()) {
     if (!S_ISLNK(found.st_mode)) return of_another(way.shown, "no link of plchost");
     PLCHOST_TRY_ASSIGN(const auto target, target_of(way.folder.get(), way.name, way.shown));
-    if (target != wanted) return of_another(way.shown, "a link to somewhere else");
-    return State::same;
+    if (target == wanted) return State::same;
+    // As 'systemctl reenable' has made it from a unit of an earlier plan.
+    if (target == place_of(PlanPart::unit).path) return State::other;
+    return of_another(way.shown, "a link to somewhere else");
   }
   if (!S_ISREG(found.st_mode)) return of_another(way.shown, "no plain file");
   const UniqueFd fd(
@@ -117,7 +127,10 @@ Result<PlanFiles::State> PlanFiles::look(const Way& way, const PlannedFile& file
   if (!fd) return failure(ErrorCode::system, "cannot open " + way.shown, errno);
   PLCHOST_TRY_ASSIGN(const auto text, read_some(fd.get(), way.shown));
   if (!text.starts_with(kPlanMark)) return of_another(way.shown, "there, and plchost has not made it");
-  return text == file.text && (found.st_mode & kAllBits) == kFileMode ? State::same : State::other;
+  // Another owner, or a second name elsewhere, could change what root's programs read.
+  const bool owned = found.st_uid == 0 || (!root_.empty() && found.st_uid == ::geteuid());
+  const bool safe = owned && found.st_nlink == 1 && (found.st_mode & kAllBits) == kFileMode;
+  return text == file.text && safe ? State::same : State::other;
 }
 
 Result<PlanFiles::State> PlanFiles::state(const PlannedFile& file) const {
@@ -158,8 +171,7 @@ Result<bool> PlanFiles::remove(PlanPart part) const {
   PLCHOST_TRY(check_errno(::fsync(folder), "cannot sync the folder of " + way.shown));
   if (place_of(part).own_folder) {
     // Unless somebody else has a file in it.
-    const std::string path = root_ + place_of(part).path;
-    ::rmdir(path.substr(0, path.rfind('/')).c_str());
+    ::unlinkat(way.above.get(), way.folder_name.c_str(), AT_REMOVEDIR);
   }
   return true;
 }

@@ -17,7 +17,7 @@ class PlanFiles {
   enum class State : std::uint8_t {
     missing,
     same,
-    other,  ///< made by plchost, with another text or of another form
+    other,  ///< made by plchost, with another text, of another form or of another owner
   };
 
   /// `root`: empty, or a folder.
@@ -34,12 +34,14 @@ class PlanFiles {
 
  private:
   struct Way {
+    UniqueFd above = {};  ///< the folder that the folder is in
+    std::string folder_name = {};
     UniqueFd folder = {};  ///< empty: it is not there
     std::string name = {};
     std::string shown = {};  ///< for errors
   };
   [[nodiscard]] Result<Way> way_to(PlanPart part, bool make) const;
-  [[nodiscard]] static Result<State> look(const Way& way, const PlannedFile& file);
+  [[nodiscard]] Result<State> look(const Way& way, const PlannedFile& file) const;
 
   std::string root_;
 };

@@ -44,6 +44,7 @@ TEST(HostPlan, IsolatesTheCoresOfTheInstances) {
   EXPECT_THAT(unit, HasSubstr("echo 3 >/proc/irq/default_smp_affinity"));
   EXPECT_THAT(unit, HasSubstr("echo 0-1 >\"$$file\""));
   EXPECT_THAT(unit, HasSubstr("for core in 2 3; do"));
+  EXPECT_THAT(unit, Not(HasSubstr("[Install]"))) << "systemctl would make a link of its own";
   EXPECT_THAT(text_of(*plan, PlanPart::irqbalance), HasSubstr("IRQBALANCE_BANNED_CPULIST=2-3\n"));
   EXPECT_THAT(text_of(*plan, PlanPart::udev), HasSubstr("try-restart plchost-tuning.service"));
 }
@@ -107,10 +108,9 @@ TEST(HostPlan, TakesItsFactsFromTheTreesOfKernelAndFiles) {
   EXPECT_THAT(facts->online, ElementsAre(0, 1, 2, 3));
   EXPECT_THAT(facts->siblings, ElementsAre(1, 2));
   EXPECT_FALSE(facts->has_grub);
-  tree.write("/usr/sbin/update-grub", "");
-  EXPECT_TRUE(plan_facts(tree.host, tree.host.files)->has_grub);
-  tree.remove("/usr");
   tree.write("/etc/default/grub", "");
+  EXPECT_FALSE(plan_facts(tree.host, tree.host.files)->has_grub) << "left over from an earlier boot loader";
+  tree.write("/usr/sbin/update-grub", "");
   EXPECT_TRUE(plan_facts(tree.host, tree.host.files)->has_grub);
   tree.remove("/sys");
   EXPECT_EQ(plan_facts(tree.host, tree.host.files).error().code, ErrorCode::not_found);
@@ -137,6 +137,14 @@ TEST(HostPlan, FindsWordsOfOthersThatWouldClash) {
   EXPECT_THAT(words_that_clash("GRUB_CMDLINE_LINUX_DEFAULT=\"quiet isolcpus=3 nohz_full=3\"\n"),
               ElementsAre("isolcpus=", "nohz_full="));
   EXPECT_THAT(words_that_clash("# GRUB_CMDLINE_LINUX_DEFAULT=\"isolcpus=3\"\nGRUB_TIMEOUT=5\n"), IsEmpty());
+}
+
+TEST(HostPlan, FindsAFileThatDropsItsWords) {
+  EXPECT_TRUE(replaces_command_line("X=1\n export GRUB_CMDLINE_LINUX_DEFAULT=\"quiet\"\n"));
+  EXPECT_TRUE(replaces_command_line("GRUB_CMDLINE_LINUX_DEFAULT="));
+  EXPECT_FALSE(replaces_command_line("GRUB_CMDLINE_LINUX_DEFAULT=\"a $GRUB_CMDLINE_LINUX_DEFAULT\"\n"));
+  EXPECT_FALSE(replaces_command_line("GRUB_CMDLINE_LINUX_DEFAULT=\"${GRUB_CMDLINE_LINUX_DEFAULT} a\"\n"));
+  EXPECT_FALSE(replaces_command_line("# GRUB_CMDLINE_LINUX_DEFAULT=a\nGRUB_CMDLINE_LINUX=\"b\"\n\n"));
 }
 
 // The host as the files of the plan leave it after a boot.

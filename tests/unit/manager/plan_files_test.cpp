@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "tests/support/own_name.hpp"
 
@@ -73,6 +74,24 @@ TEST_F(PlanFilesTest, HaveALinkThatTurnsTheUnitOn) {
   EXPECT_EQ(sut_.state(link), State::same);
   EXPECT_EQ(sut_.remove(PlanPart::unit_link), true);
   EXPECT_EQ(sut_.state(link), State::missing);
+  std::filesystem::create_symlink(place_of(PlanPart::unit).path, at(PlanPart::unit_link));
+  EXPECT_EQ(sut_.state(link), State::other) << "as systemctl makes it";
+  EXPECT_EQ(sut_.remove(PlanPart::unit_link), true);
+  EXPECT_EQ(sut_.state(link), State::missing);
+}
+
+TEST_F(PlanFilesTest, AreWrittenAnewIfAnotherCouldChangeThem) {
+  EXPECT_TRUE(sut_.write(file_));
+  std::filesystem::create_hard_link(at(PlanPart::sysctl), root_ / "second_name");
+  EXPECT_EQ(sut_.state(file_), State::other);
+  EXPECT_TRUE(sut_.write(file_));
+  EXPECT_EQ(sut_.state(file_), State::same);
+  // Only root can give a file away.
+  if (::geteuid() != 0) return;
+  ASSERT_EQ(::chown(at(PlanPart::sysctl).c_str(), 65534, 65534), 0);
+  EXPECT_EQ(sut_.state(file_), State::other);
+  EXPECT_TRUE(sut_.write(file_));
+  EXPECT_EQ(sut_.state(file_), State::same);
 }
 
 TEST_F(PlanFilesTest, OfAnotherAreLeftAlone) {
