@@ -8,8 +8,10 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/limits.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include "api/security/folder_files.hpp"
@@ -43,6 +45,42 @@ Result<void> exchange_folders(const std::string& fresh, const std::string& old) 
   return sync_directory(fs::path(old).parent_path());
 }
 
+// In its place another folder would be, and the one behind the link would stay as it is.
+Result<void> check_is_no_link(const std::string& folder) {
+  std::error_code error;
+  if (!fs::is_symlink(folder, error)) return {};
+  return failure(ErrorCode::wrong_state,
+                 fmt::format("{} is a symbolic link, which cannot be exchanged with a fresh folder; put the "
+                             "folder itself there",
+                             folder));
+}
+
+// The lists of setfacl(1). One that the copy has inherited from the folder above is none of the original.
+Result<void> copy_access_lists(const std::string& original, const std::string& copy) {
+  for (const char* const list : {"system.posix_acl_access", "system.posix_acl_default"}) {
+    std::string value(XATTR_SIZE_MAX, '\0');
+    const auto size = ::getxattr(original.c_str(), list, value.data(), value.size());
+    if (size < 0 && errno != ENODATA && errno != EOPNOTSUPP)
+      return failure(ErrorCode::system, "cannot read the access list of " + original, errno);
+    const bool done =
+        size < 0 ? ::removexattr(copy.c_str(), list) == 0 || errno == ENODATA || errno == EOPNOTSUPP
+                 : ::setxattr(copy.c_str(), list, value.data(), static_cast<std::size_t>(size), 0) == 0;
+    if (!done) return failure(ErrorCode::system, "cannot set the access list of " + copy, errno);
+  }
+  return {};
+}
+
+// The mode last: without an access list its bits for the group are those of the group again.
+Result<void> give_rights_of(const std::string& original, const std::string& copy) {
+  struct stat status{};
+  PLCHOST_TRY(check_errno(::stat(original.c_str(), &status), "cannot examine " + original));
+  PLCHOST_TRY(check_errno(::chown(copy.c_str(), status.st_uid, status.st_gid), "cannot give " + copy));
+  PLCHOST_TRY(copy_access_lists(original, copy));
+  PLCHOST_TRY(
+      check_errno(::chmod(copy.c_str(), status.st_mode & ALLPERMS), "cannot set the rights of " + copy));
+  return {};
+}
+
 // As it is, with all files; those that are replaced in the copy stay as they are in the original.
 Result<void> copy_folder(const std::string& from, const std::string& to) {
   std::error_code error;
@@ -50,19 +88,11 @@ Result<void> copy_folder(const std::string& from, const std::string& to) {
       fs::copy_options::recursive | fs::copy_options::create_hard_links | fs::copy_options::copy_symlinks;
   fs::copy(from, to, kOptions, error);
   if (error) return failure(ErrorCode::system, fmt::format("cannot copy {}", from), error.value());
-  const auto give_owner = [](const std::string& original, const std::string& copy) -> Result<void> {
-    struct stat status{};
-    PLCHOST_TRY(check_errno(::stat(original.c_str(), &status), "cannot examine " + original));
-    PLCHOST_TRY(check_errno(::chown(copy.c_str(), status.st_uid, status.st_gid), "cannot give " + copy));
-    PLCHOST_TRY(
-        check_errno(::chmod(copy.c_str(), status.st_mode & ALLPERMS), "cannot set the rights of " + copy));
-    return {};
-  };
-  PLCHOST_TRY(give_owner(from, to));
+  PLCHOST_TRY(give_rights_of(from, to));
   for (fs::recursive_directory_iterator at(from, error), end; !error && at != end; at.increment(error)) {
     if (!at->is_directory(error) || at->is_symlink(error)) continue;
     const std::string copy = to + at->path().string().substr(from.size());
-    PLCHOST_TRY(give_owner(at->path(), copy));
+    PLCHOST_TRY(give_rights_of(at->path(), copy));
     PLCHOST_TRY(sync_directory(copy));
   }
   if (error) return failure(ErrorCode::system, "cannot read " + from, error.value());
@@ -199,6 +229,7 @@ Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& v
                                  to_string(known.subject.role)));
     }
   }
+  PLCHOST_TRY(check_is_no_link(path(name)));
   const std::string fresh = fresh_folder(name);
   Unfinished unfinished(fresh);
   PLCHOST_TRY(make_folder(fresh));
@@ -225,6 +256,7 @@ Result<void> SecurityFolder::renew(const std::string& name, int days) {
   if (known.revoked) {
     return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked; add it anew", name));
   }
+  PLCHOST_TRY(check_is_no_link(path(name)));
   const std::string fresh = fresh_folder(name);
   const Unfinished removed_at_the_end(fresh);  // then it is the old one
   PLCHOST_TRY(copy_folder(path(name), fresh));
@@ -234,9 +266,11 @@ Result<void> SecurityFolder::renew(const std::string& name, int days) {
 }
 
 Result<void> SecurityFolder::revoke(const std::string& name) {
-  PLCHOST_TRY(finish_earlier());
   PLCHOST_TRY_ASSIGN(const auto known, view(name));
-  if (known.revoked) return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked already", name));
+  if (known.revoked) {
+    PLCHOST_TRY(finish_earlier());
+    return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked already", name));
+  }
   PLCHOST_TRY_ASSIGN(auto certificates, issued(name));
   PLCHOST_TRY_ASSIGN(auto newest, read_certificate(file_in(path(name), kCertificateFile)));
   certificates.push_back(std::move(newest));
@@ -244,11 +278,11 @@ Result<void> SecurityFolder::revoke(const std::string& name) {
   PLCHOST_TRY_ASSIGN(const auto more,
                      make_revocations(revocations, certificates, validity_for(kDaysOfAuthority), identity_));
   PLCHOST_TRY(write_text(authority_file(kRevocationsFile), to_pem(more), kPublicFile));
-  PLCHOST_TRY_ASSIGN(const auto all, names());
-  for (const std::string& each : all) {
-    PLCHOST_TRY(write_text(file_in(path(each), kRevocationsFile), to_pem(more), kPublicFile));
-  }
-  return {};
+  const auto done = finish_earlier();  // the fresh list, and all else, to each folder
+  if (done) return {};
+  return failure(done.error().code,
+                 fmt::format("'{}' is revoked, but not in all folders: {}", name, done.error().message),
+                 done.error().system_errno);
 }
 
 Result<std::vector<IdentityView>> SecurityFolder::identities() const {

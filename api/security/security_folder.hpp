@@ -34,10 +34,11 @@ class SecurityFolder {
   [[nodiscard]] Result<void> add(Role role, const std::string& name, int days = kDaysOfIdentity);
   /// The same role and name with a fresh key and certificate; the old one stays valid until it ends, or until
   /// the name is revoked. In one step: if this process is ended, key and certificate belong together.
-  /// wrong_state: it is revoked.
+  /// wrong_state: it is revoked, or its folder is a symbolic link.
   [[nodiscard]] Result<void> renew(const std::string& name, int days = kDaysOfIdentity);
   /// All certificates that were ever made for that name are worth nothing from now on, in every folder that
-  /// is brought up to date.
+  /// is brought up to date. The authority's list comes first. A folder that cannot be written keeps none of
+  /// the others from its list: the first such error is returned, and the next command tries again.
   [[nodiscard]] Result<void> revoke(const std::string& name);
   /// All identities, by name.
   [[nodiscard]] Result<std::vector<IdentityView>> identities() const;
@@ -67,7 +68,7 @@ class SecurityFolder {
   [[nodiscard]] Result<void> copy_common(const std::string& to) const;
   [[nodiscard]] Result<void> tell_hosts(const std::string& identity) const;
   [[nodiscard]] Result<void> know_all(const std::string& known) const;
-  /// Folders that an earlier command has not brought up to date, because it was cut off.
+  /// Folders that an earlier command has not brought up to date. All of them; the first error.
   [[nodiscard]] Result<void> finish_earlier() const;
 
   std::string folder_;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,6 +19,15 @@
 namespace plchost::security {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+// One folder that cannot be written keeps nothing from the others.
+void keep_first(Result<void>& first, Result<void> next) {
+  if (first && !next) first = std::move(next);
+}
+
+}  // namespace
 
 Result<void> write_text(const std::string& path, const Result<std::string>& text, mode_t mode) {
   PLCHOST_TRY_ASSIGN(const auto& contents, text);
@@ -102,13 +112,14 @@ Result<void> SecurityFolder::copy_common(const std::string& to) const {
 Result<void> SecurityFolder::tell_hosts(const std::string& identity) const {
   PLCHOST_TRY_ASSIGN(const auto all, names());
   const auto certificate = read_file(file_in(path(identity), kCertificateFile));
+  Result<void> told;
   for (const std::string& name : all) {
     const std::string known = file_in(path(name), kKnownFolder);
     std::error_code ignored;
     if (!fs::is_directory(known, ignored)) continue;
-    PLCHOST_TRY(renew_text(file_in(known, identity + ".pem"), certificate, kPublicFile));
+    keep_first(told, renew_text(file_in(known, identity + ".pem"), certificate, kPublicFile));
   }
-  return {};
+  return told;
 }
 
 Result<void> SecurityFolder::know_all(const std::string& known) const {
@@ -130,13 +141,15 @@ Result<void> SecurityFolder::finish_earlier() const {
   }
   for (const fs::path& each : unfinished) fs::remove_all(each, error);
   PLCHOST_TRY_ASSIGN(const auto all, names());
+  Result<void> finished;
   for (const std::string& name : all) {
     for (const std::string_view file : kCommonFiles) {
-      PLCHOST_TRY(renew_text(file_in(path(name), file), read_file(authority_file(file)), kPublicFile));
+      const auto text = read_file(authority_file(file));
+      keep_first(finished, renew_text(file_in(path(name), file), text, kPublicFile));
     }
-    PLCHOST_TRY(tell_hosts(name));
+    keep_first(finished, tell_hosts(name));
   }
-  return {};
+  return finished;
 }
 
 }  // namespace plchost::security

@@ -1,6 +1,9 @@
 #include "api/security/security_folder.hpp"
 
+#include <cstdint>
+
 #include <sys/stat.h>
+#include <sys/xattr.h>
 
 #include "api/security/known_identities.hpp"
 #include "api/security/pem.hpp"
@@ -132,6 +135,74 @@ TEST_F(TheSecurityFolder, ARenewedIdentityKeepsTheOtherFilesOfItsFolder) {
   EXPECT_FALSE(fs::exists(folder(".host.new")));
 }
 
+// setfacl(1): entries of the owner, a user, the group, the mask and others, each with tag, rights and id.
+std::string access_list(std::uint32_t user, std::uint16_t rights) {
+  std::string list;
+  const auto put = [&](auto value) { list.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  const auto entry = [&](std::uint16_t tag, std::uint16_t allowed, std::uint32_t id) {
+    put(tag);
+    put(allowed);
+    put(id);
+  };
+  constexpr std::uint32_t kNobody = 0xffff'ffff;
+  put(std::uint32_t{2});  // the version
+  entry(0x01, 7, kNobody);
+  entry(0x02, rights, user);
+  entry(0x04, 0, kNobody);
+  entry(0x10, rights, kNobody);
+  entry(0x20, 0, kNobody);
+  return list;
+}
+
+constexpr const char* kAccess = "system.posix_acl_access";
+constexpr const char* kDefault = "system.posix_acl_default";
+
+std::string attribute(const std::string& path, const char* name) {
+  std::string value(256, '\0');
+  const auto size = ::getxattr(path.c_str(), name, value.data(), value.size());
+  value.resize(size < 0 ? 0 : static_cast<std::size_t>(size));
+  return value;
+}
+
+bool give(const std::string& path, const char* name, const std::string& value) {
+  return ::setxattr(path.c_str(), name, value.data(), value.size(), 0) == 0;
+}
+
+TEST_F(TheSecurityFolder, ARenewedIdentityKeepsTheAccessListsOfItsFolders) {
+  const std::string of_host = access_list(12'345, 5);
+  const std::string inherited = access_list(12'346, 7);
+  if (!give(folder("host"), kAccess, of_host)) GTEST_SKIP() << "needs a file system with access lists";
+  ASSERT_TRUE(give(file("host", "known"), kDefault, of_host));
+  ASSERT_TRUE(give(plant, kDefault, inherited));
+  ASSERT_TRUE(open().renew("host"));
+  EXPECT_EQ(attribute(folder("host"), kAccess), of_host);
+  EXPECT_EQ(attribute(folder("host"), kDefault), "") << "it had none";
+  EXPECT_EQ(attribute(file("host", "known"), kAccess), "");
+  EXPECT_EQ(attribute(file("host", "known"), kDefault), of_host);
+  EXPECT_EQ(std::filesystem::status(file("host", "known")).permissions(), std::filesystem::perms(0700));
+}
+
+TEST_F(TheSecurityFolder, DoesNotReplaceALinkToAFolder) {
+  namespace fs = std::filesystem;
+  add(Role::operating, "anna");
+  const std::string elsewhere = base + "/elsewhere";
+  fs::rename(folder("anna"), elsewhere);
+  fs::create_directory_symlink(elsewhere, folder("anna"));
+  const std::string key = contents(file("anna", kKeyFile));
+  const auto refused = [&](const Result<void>& done) {
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().code, ErrorCode::wrong_state);
+    EXPECT_THAT(done.error().message, HasSubstr(folder("anna") + " is a symbolic link"));
+    EXPECT_TRUE(fs::is_symlink(folder("anna")));
+    EXPECT_EQ(contents(file("anna", kKeyFile)), key);
+    EXPECT_FALSE(fs::exists(folder(".anna.new")));
+  };
+  refused(open().renew("anna"));
+  ASSERT_TRUE(open().revoke("anna"));
+  EXPECT_THAT(fault("anna"), HasSubstr("revoked")) << "also behind the link";
+  refused(open().add(Role::viewer, "anna"));
+}
+
 // A revocation that was cut off would else say for ever that it is done.
 TEST_F(TheSecurityFolder, IsBroughtUpToDateByTheNextCommandIfOneWasCutOff) {
   namespace fs = std::filesystem;
@@ -147,6 +218,37 @@ TEST_F(TheSecurityFolder, IsBroughtUpToDateByTheNextCommandIfOneWasCutOff) {
   EXPECT_EQ(contents(file("otto", kRevocationsFile)), after);
   EXPECT_EQ(contents(file("host", "known/otto.pem")), contents(file("otto", kCertificateFile)));
   EXPECT_FALSE(fs::exists(folder(".otto.new")));
+}
+
+// As a file without write permission, but for root, too: a folder stands where the fresh file is written.
+TEST_F(TheSecurityFolder, RevokesInAllOtherFoldersIfOneCannotBeWritten) {
+  for (const std::string name : {"anna", "otto", "zoe"}) add(Role::operating, name);
+  const std::string in_the_way = file("anna", kRevocationsFile) + ".new";
+  std::filesystem::create_directory(in_the_way);
+  for (const std::string name : {"otto", "zoe"}) {
+    const auto revoked = open().revoke(name);
+    ASSERT_FALSE(revoked);
+    EXPECT_THAT(revoked.error().describe(), HasSubstr("'" + name + "' is revoked, but not in all folders"));
+    EXPECT_THAT(revoked.error().describe(), HasSubstr(in_the_way));
+    EXPECT_THAT(fault(name), HasSubstr("revoked"));
+  }
+  EXPECT_EQ(contents(file("host", kRevocationsFile)), contents(file("authorities", kRevocationsFile)));
+  const auto again = open().revoke("zoe");
+  ASSERT_FALSE(again);
+  EXPECT_THAT(again.error().describe(), HasSubstr(in_the_way)) << "as long as it is not done everywhere";
+  std::filesystem::remove(in_the_way);
+  EXPECT_EQ(open().revoke("zoe").error().code, ErrorCode::wrong_state);
+  EXPECT_EQ(contents(file("anna", kRevocationsFile)), contents(file("authorities", kRevocationsFile)));
+}
+
+TEST_F(TheSecurityFolder, TellsAllOtherHostsOfAnIdentityIfOneCannotBeWritten) {
+  add(Role::host, "north");
+  add(Role::host, "south");
+  for (const std::string name : {"host", "north"}) write(file(name, "known/south.pem"), "before");
+  const std::string in_the_way = file("host", "known/south.pem.new");
+  std::filesystem::create_directory(in_the_way);
+  EXPECT_THAT(open().add(Role::viewer, "anna").error().describe(), HasSubstr(in_the_way));
+  EXPECT_EQ(contents(file("north", "known/south.pem")), contents(file("south", kCertificateFile)));
 }
 
 TEST_F(TheSecurityFolder, AFileThatIsNoneMakesNobodyWait) {
