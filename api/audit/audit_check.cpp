@@ -24,7 +24,8 @@ void AuditWalk::take(const std::string& where, std::string_view line) {
   }
   end();
   if (link->what == "gap") {
-    findings_.remarks.push_back(fmt::format("{}: records before could not be written", where));
+    findings_.remarks.push_back(
+        fmt::format("{}: records before could not be written, or may be missing", where));
   }
   if (link->what == "disk") {
     findings_.remarks.push_back(fmt::format("{}: a disk error; records before were written again", where));

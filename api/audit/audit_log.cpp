@@ -96,9 +96,9 @@ Result<void> AuditLog::open_file(const std::string& path) {
   bytes_ = static_cast<std::size_t>(status.st_size);
   const std::lock_guard lock(guard_);
   file_ = std::move(fd);
-  path_ = path;
   unsynced_.clear();
   unsynced_at_ = bytes_;
+  unsynced_before_ = bytes_ > 0;
   dirty_ = true;
   return {};
 }
@@ -165,9 +165,15 @@ Result<void> AuditLog::append(const AuditRecord& record) {
       PLCHOST_TRY(write(of_the_log("gap", count_text(missed_, "record") + " could not be written")));
       missed_ = 0;
     }
-    if (written_again_) {
+    if (lost_before_) {
       PLCHOST_TRY(write(of_the_log(
-          "disk", "the disk reported an error; the records that it may have lost were written again")));
+          "gap", "the disk reported an error: records of the process before may be missing on it")));
+      lost_before_ = false;
+    }
+    if (written_again_) {
+      PLCHOST_TRY(write(of_the_log("disk",
+                                   "the disk reported an error; the records of this process that it may have "
+                                   "lost were written again")));
       written_again_ = false;
     }
     return write(record);
@@ -190,7 +196,8 @@ void AuditLog::take_error_before() {
 }
 
 // Each error of the disk is told once: the sync after a failed one succeeds, though the kernel may have
-// dropped what it could not write. So that is written again, before the next sync.
+// dropped what it could not write. So that is written again, before the next sync: this process has the bytes
+// of its own records, and none of those of the process before.
 Result<void> AuditLog::sync() {
   const std::lock_guard one(syncing_);
   const std::string failed = "cannot sync the audit log in " + options_.folder;
@@ -205,11 +212,15 @@ Result<void> AuditLog::sync() {
     confirmed = unsynced_.size();
     begin = unsynced_at_;
     if (sync_failed_) again = unsynced_;
-    // Not that of the log, which can only append.
-    file.reset(again.empty() ? ::fcntl(file_.get(), F_DUPFD_CLOEXEC, 0)
-                             : ::open(path_.c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW));
+    file.reset(::fcntl(file_.get(), F_DUPFD_CLOEXEC, 0));
   }
   auto done = check_errno(file.get(), failed);
+  if (done && !again.empty()) {
+    // That of the log can only append. The same file, whatever has its name now; the disk may let open()
+    // wait.
+    file.reset(::open(fmt::format("/proc/self/fd/{}", file.get()).c_str(), O_WRONLY | O_CLOEXEC));
+    done = check_errno(file.get(), failed);
+  }
   for (std::size_t at = 0; done && at < again.size();) {
     const auto written =
         ::pwrite(file.get(), again.data() + at, again.size() - at, static_cast<off_t>(begin + at));
@@ -220,6 +231,8 @@ Result<void> AuditLog::sync() {
   const std::lock_guard lock(guard_);
   dirty_ = dirty_ || !done;
   sync_failed_ = !done;
+  // One error is enough: this process does not have those bytes.
+  if (std::exchange(unsynced_before_, false) && !done) lost_before_ = true;
   if (!done) return std::unexpected(done.error());
   unsynced_.erase(0, confirmed);
   unsynced_at_ += confirmed;
@@ -245,7 +258,9 @@ void AuditLog::tell_sync(const std::string& problem) {
   }
   if (problem.empty()) {
     spdlog::info(
-        "the audit log in {} reaches the disk again; the records of the time before were written again",
+        "the audit log in {} reaches the disk again; the records of this process since the last good sync "
+        "were "
+        "written again",
         options_.folder);
   } else {
     spdlog::error("records of the audit log may not survive a loss of power: {}", problem);

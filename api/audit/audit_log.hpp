@@ -20,8 +20,10 @@ namespace plchost {
 /// Each change and its client, in files that are only appended to. Each record carries the hash of the one
 /// before, so that a change of any of them shows (see check_audit). A record survives, when append() has
 /// returned, the end of this process. The disk gets it within kSyncPeriod: from then on it survives a loss of
-/// power. If the disk reports an error, the records since the last good sync are written again. The kernel
-/// may have dropped them, and its next sync succeeds without them. One thread; one log for each folder.
+/// power. If the disk reports an error, the records of this process since its last good sync are written
+/// again. The kernel may have dropped them, and its next sync succeeds without them. If the first sync fails,
+/// records of the process before may be missing, and a record `gap` says so. One thread; one log for each
+/// folder.
 class AuditLog {
  public:
   struct Options {
@@ -68,12 +70,13 @@ class AuditLog {
   std::size_t bytes_ = 0;                   // of the file
   std::uint64_t missed_ = 0;                // records that could not be written
   std::atomic<bool> written_again_{false};  // and the log does not tell it yet
+  std::atomic<bool> lost_before_{false};    // perhaps, of the process before; the log does not tell it yet
   std::mutex syncing_;                      // held as long as a sync lasts
   mutable std::mutex guard_;                // of what follows
   UniqueFd file_;
-  std::string path_;      // of it
   std::string unsynced_;  // its end, as far as no sync has confirmed it
   std::size_t unsynced_at_ = 0;
+  bool unsynced_before_ = false;  // bytes of the process before, of which no sync has told anything yet
   bool dirty_ = false;
   bool sync_failed_ = false;  // the last one: records that were written before it may be lost
   std::string sync_problem_;

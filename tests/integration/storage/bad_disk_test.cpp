@@ -1,0 +1,129 @@
+// The audit log on a disk that refuses what it had taken. The recorder is linked, and lets the disk do so.
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "api/audit/audit_check.hpp"
+#include "api/audit/audit_log.hpp"
+#include "tests/support/own_name.hpp"
+
+namespace plchost {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class LogOnABadDisk : public testing::Test {
+ protected:
+  LogOnABadDisk() {
+    fs::create_directories(top_);
+    ::setenv("RECORDED_FOLDER", top_.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+    ::setenv("DISK_FAULT", fault_.c_str(), 1);     // NOLINT(concurrency-mt-unsafe)
+  }
+  ~LogOnABadDisk() override {
+    ::unsetenv("DISK_FAULT");       // NOLINT(concurrency-mt-unsafe)
+    ::unsetenv("RECORDED_FOLDER");  // NOLINT(concurrency-mt-unsafe)
+    fs::remove_all(root_);
+  }
+  static AuditRecord stop_of(const std::string& instance) {
+    AuditRecord record;
+    record.what = "stop";
+    record.on = instance;
+    return record;
+  }
+  [[nodiscard]] std::unique_ptr<AuditLog> open() const {
+    auto log = AuditLog::open({.folder = folder_});
+    EXPECT_TRUE(log) << log.error().describe();
+    return log ? *std::move(log) : nullptr;
+  }
+  /// A log whose first sync fails, with a record of its own or without. The process before has left one.
+  [[nodiscard]] std::unique_ptr<AuditLog> open_with_a_fault(bool with_record) const {
+    std::unique_ptr<AuditLog> log = open();
+    EXPECT_TRUE(log->append(stop_of("line1")));
+    do {  // it may have been synced just before
+      fs::remove(fault_);
+      log.reset();
+      log = open();
+      EXPECT_TRUE(!with_record || log->append(stop_of("line2")));
+      std::ofstream(fault_) << "read-only";
+    } while (!tells_of_a_problem(*log));
+    return log;
+  }
+  static bool tells_of_a_problem(const AuditLog& log) {
+    for (int looks = 0; looks < 30 && log.sync_problem().empty(); ++looks)
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    return !log.sync_problem().empty();
+  }
+  void mend(const AuditLog& log) const {
+    fs::remove(fault_);
+    while (!log.sync_problem().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  [[nodiscard]] std::vector<std::string> remarks() const {
+    const auto checked = check_audit(folder_);
+    EXPECT_TRUE(checked);
+    EXPECT_THAT(checked->problems, IsEmpty());
+    return checked->remarks;
+  }
+
+  const fs::path root_ = own_path("bad_disk");
+  const fs::path fault_ = root_ / "fault";
+  const fs::path top_ = root_ / "disk";
+  const std::string folder_ = top_ / "audit.cell";
+};
+
+// The bytes of the process before, whose end the disk may have refused: nobody has them any more.
+TEST_F(LogOnABadDisk, TellsThatRecordsOfTheProcessBeforeMayBeMissing) {
+  {
+    const auto log = open_with_a_fault(false);
+    mend(*log);
+    ASSERT_TRUE(log->append(stop_of("line3")));
+  }
+  EXPECT_THAT(remarks(), ElementsAre(HasSubstr("or may be missing")));
+}
+
+TEST_F(LogOnABadDisk, TellsOnceOfThoseOfTheProcessBeforeAndEachTimeOfItsOwn) {
+  {
+    const auto log = open_with_a_fault(true);
+    mend(*log);
+    ASSERT_TRUE(log->append(stop_of("line3")));
+    do {
+      fs::remove(fault_);
+      ASSERT_TRUE(log->append(stop_of("line4")));
+      std::ofstream(fault_) << "read-only";
+    } while (!tells_of_a_problem(*log));
+    mend(*log);
+    ASSERT_TRUE(log->append(stop_of("line5")));
+  }
+  EXPECT_THAT(remarks(),
+              ElementsAre(HasSubstr("or may be missing"), HasSubstr("records before were written again"),
+                          HasSubstr("records before were written again")));
+}
+
+TEST_F(LogOnABadDisk, WritesNothingIntoAnotherFileOfItsName) {
+  const fs::path file = folder_ + "/audit.0000000001.log";
+  const fs::path other = root_ / "other";
+  const auto log = open_with_a_fault(true);
+  std::ofstream(other) << "of another program";
+  // Not rename(), which the disk refuses.
+  ASSERT_EQ(::syscall(SYS_renameat2, AT_FDCWD, other.c_str(), AT_FDCWD, file.c_str(), 0U), 0);
+  mend(*log);
+  std::ifstream stream(file);
+  EXPECT_EQ((std::string{std::istreambuf_iterator<char>(stream), {}}), "of another program");
+}
+
+}  // namespace
+}  // namespace plchost
