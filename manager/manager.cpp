@@ -323,7 +323,7 @@ Result<void> Manager::run() {
                count_text(config_.instances.size(), "instance"), config_.host.pool,
                config_.host.run_directory);
   groups_.remove_empty(control_group_name(config_.host.pool, ""));
-  groups_.remove_empty(trial_group_name(config_.host.pool, ""));
+  groups_.end_all(trial_group_name(config_.host.pool, ""));
   adopt_removed();
   warn_of_strangers(config_.host.run_directory, supervisor_->configs());
   supervisor_->start();
@@ -423,8 +423,8 @@ void Manager::remove_groups() {
 
 void Manager::clean_up() {
   restore_latency();
+  groups_.end_all(trial_group_name(config_.host.pool, ""));  // of a trial that was under way
   remove_groups();
-  groups_.remove_empty(trial_group_name(config_.host.pool, ""));  // of a trial that was under way
   for (const auto& [instance, wishes] : wishes_) wishes->end();
   // Also those that were removed from the configuration.
   config_.instances = supervisor_->configs();

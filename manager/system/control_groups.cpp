@@ -150,8 +150,9 @@ std::string control_group_name(std::string_view pool, std::string_view instance)
   return fmt::format("{}.instance.{}", pool, instance);
 }
 
+// No name has a colon, but names may have dots: of no pool is it the group of an instance.
 std::string trial_group_name(std::string_view pool, std::string_view instance) {
-  return fmt::format("{}.trial.{}", pool, instance);
+  return fmt::format("{}:trial:{}", pool, instance);
 }
 
 ControlGroups ControlGroups::find(const std::string& folder) {
@@ -242,6 +243,18 @@ void ControlGroups::end(const std::string& name) {
   before_.erase(name);
   if (std::ranges::find(ended_, name) == ended_.end()) ended_.push_back(name);
   (void)remove_ended();
+}
+
+void ControlGroups::end_all(std::string_view prefix) {
+  if (!problem_.empty()) return;
+  std::vector<std::string> found;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder_, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string name = at->path().filename();
+    if (name.starts_with(prefix)) found.push_back(name);
+  }
+  for (const std::string& name : found) end(name);
 }
 
 bool ControlGroups::remove_ended() {

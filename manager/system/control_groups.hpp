@@ -80,6 +80,8 @@ class ControlGroups {
   [[nodiscard]] GroupCounts counts(const std::string& name) const;
   /// Ends all processes as kill() does, and the group goes when the last of them has ended.
   void end(const std::string& name);
+  /// The same for all groups whose names begin with this.
+  void end_all(std::string_view prefix);
   /// Removes groups that have ended. To be called periodically. True: none is left to remove.
   bool remove_ended();
   /// Removes those whose names begin with this and in which no process is: of instances that ended unwatched.

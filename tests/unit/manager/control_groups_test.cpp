@@ -180,6 +180,34 @@ TEST_F(ControlGroupsTest, AreUsedAgainByTheNextProcess) {
   EXPECT_FALSE(folder_.has("line1"));
 }
 
+TEST_F(ControlGroupsTest, EndWithAllWhoseNamesBeginTheSame) {
+  const std::string trial = trial_group_name("p", "line1");
+  const std::string instance = control_group_name("p", "line1");
+  std::vector<ChildProcess> processes;
+  for (const std::string& group : {trial, instance}) {
+    ASSERT_TRUE(sut_.make(group, {}));
+    auto process = run_in(folder_.path() + "/" + group, "exec sleep 1000");
+    ASSERT_TRUE(process);
+    processes.push_back(*std::move(process));
+    ASSERT_TRUE(folder_.comes_to(group, 1));
+  }
+  ControlGroups next = ControlGroups::find(folder_.path());
+  next.end_all(trial_group_name("p", ""));
+  kill_and_reap(processes.front());
+  for (int i = 0; i < 1000 && !next.remove_ended(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_FALSE(folder_.has(trial));
+  EXPECT_EQ(folder_.processes(instance), 1);
+  kill_and_reap(processes.back());
+}
+
+// Names of pools and instances may have dots.
+TEST(NamesOfGroups, OfTrialsAreThoseOfNoInstance) {
+  EXPECT_NE(trial_group_name("p", "instance.b"), control_group_name("p.trial", "b"));
+  EXPECT_NE(trial_group_name("p", "b"), control_group_name("p", "trial.b"));
+  EXPECT_FALSE(control_group_name("p.trial", "b").starts_with(trial_group_name("p", "")));
+}
+
 TEST_F(ControlGroupsTest, HaveTheLimitsOfTheLastStartOnly) {
   if (lacks("memory") || lacks("pids")) GTEST_SKIP() << kNoLimits;
   ASSERT_TRUE(sut_.make("line1", {.memory_bytes = 64U << 20, .pids = 20}));

@@ -301,7 +301,7 @@ TEST(StoreOrder, SurvivesTheRoundTrip) {
   order.keep = 5;
   order.name = "l\xc3\xa4mp.so";
   order.trial = {"/usr/bin/plc-instance", "--name", "line \"1\""};
-  order.trial_group = "/sys/fs/cgroup/p.trial.line1";
+  order.trial_group = "/sys/fs/cgroup/p:trial:line1";
   const auto decoded = decode_store_order(encode(order));
   ASSERT_TRUE(decoded);
   EXPECT_EQ(decoded->parent, 4711);
