@@ -120,14 +120,17 @@ class Report {
   std::vector<std::string> parts_missing_;
 };
 
-/// The user names it. A link, a folder or a device stays as it is, and so does the user's own "FILE.new".
-Result<void> write_for_owner(const std::string& file, std::string_view text) {
+/// The user names it: a link, a folder or a device stays as it is.
+Result<void> check_is_plain(const std::string& file) {
   struct stat status{};
-  if (::lstat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
-    return failure(
-        ErrorCode::wrong_type,
-        fmt::format("{} is no plain file: name a plain file, or one that is not there", printable(file)));
-  }
+  if (::lstat(file.c_str(), &status) != 0 || S_ISREG(status.st_mode)) return {};
+  return failure(
+      ErrorCode::wrong_type,
+      fmt::format("{} is no plain file: name a plain file, or one that is not there", printable(file)));
+}
+
+/// The user's own "FILE.new" stays as it is.
+Result<void> write_for_owner(const std::string& file, std::string_view text) {
   std::string fresh = file + ".XXXXXX";
   if (const UniqueFd made(::mkostemp(fresh.data(), O_CLOEXEC)); !made)
     return failure(ErrorCode::system, fmt::format("cannot make a file beside {}", printable(file)), errno);
@@ -141,6 +144,7 @@ Result<void> write_for_owner(const std::string& file, std::string_view text) {
 
 int save_report(CliSession& session, const std::string& instance, const std::string& file,
                 const std::string& version) {
+  if (const auto plain = check_is_plain(file); !plain) return CliSession::fail(plain.error());
   auto host = session.target_host();
   if (!host) return CliSession::fail(host.error());
   Report report(session, *std::move(host), instance);
