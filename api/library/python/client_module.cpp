@@ -119,6 +119,8 @@ unsigned long long record_variables(Client& self, const std::string& host, const
   const Client::RecordOptions options{milliseconds_of(interval), duration_of(duration), count};
   const auto take = [&sink](const std::string& lines) {
     const py::gil_scoped_acquire gil;
+    if (::PyErr_CheckSignals() != 0)
+      throw py::error_already_set();  // Ctrl-C: a sink may run no line of Python
     return !(*sink)(ToPython()(lines)).is(py::bool_(false));
   };
   const py::gil_scoped_release release;

@@ -190,7 +190,7 @@ PYTHONPATH=$BIN/../python python3 "$cell/sends.py" "$APPLICATIONS/packer.so" "$c
 
 echo "- Python records variables"
 cat >"$cell/records.py" <<'EOF'
-import os, sys, plchost_client
+import os, signal, sys, threading, plchost_client
 with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
     of = ("north", "press1", ["fast.*", "line.label"])
     assert client.record_variables(*of, interval=0.02, count=5, file=sys.argv[1]) == 5
@@ -219,6 +219,12 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
         client.record_variables(*of, sink=raises)
         raise AssertionError("its exception is lost")
     except KeyError:
+        pass
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        client.record_variables(*of, interval=0.02, sink=texts.append)  # for ever, without a line of Python
+    except KeyboardInterrupt:
         pass
 EOF
 PYTHONPATH=$BIN/../python timeout 120 python3 "$cell/records.py" "$cell/record.csv" || fail "recordings of Python"
