@@ -19,14 +19,14 @@ namespace plchost {
 namespace {
 
 // The names of C++ templates have no bound. A cut one keeps its offset and its file, if they are short.
-constexpr std::size_t kMaxName = 255;
+constexpr std::size_t kMostOfAName = 255;
 
 std::string bounded(const std::string& name) {
   constexpr std::string_view kCut = "...";
   const std::size_t offset = std::min(name.rfind("+0x"), name.size());
   const std::size_t tail = name.size() - offset;
-  if (name.size() <= kMaxName || tail > kMaxName / 2) return shortened(name, kMaxName);
-  const std::string_view head = cut(name, kMaxName - tail - kCut.size());
+  if (name.size() <= kMostOfAName || tail > kMostOfAName / 2) return shortened(name, kMostOfAName);
+  const std::string_view head = cut(name, kMostOfAName - tail - kCut.size());
   return fmt::format("{}{}{}", head, kCut, std::string_view(name).substr(offset));
 }
 
