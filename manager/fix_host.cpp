@@ -53,7 +53,7 @@ bool fail(const std::string& text) {
 std::optional<std::string> program_path(const std::string& name) {
   if (name.starts_with('/')) return HostFiles().exists(name) ? std::optional(name) : std::nullopt;
   for (const char* const folder : kProgramFolders) {
-    if (const std::string path = folder + name; ::access(path.c_str(), X_OK) == 0) return path;
+    if (std::string path = folder + name; ::access(path.c_str(), X_OK) == 0) return path;
   }
   return std::nullopt;
 }

@@ -207,7 +207,7 @@ class ValueCollector {
     const iec::DeclaredType* const declared = depth > kMostNested ? nullptr : find_type(first);
     if (declared == nullptr) return "0u";
     const std::string definition = declared->definition.substr(declared->definition.find(':') + 1);
-    Words inner(definition);
+    const Words inner(definition);
     const bool has_name = inner.is("STRUCT") || inner.is("(");
     return has_name ? fmt::format("sizeof({})", first) : size_of(definition, depth + 1);
   }

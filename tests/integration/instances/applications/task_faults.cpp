@@ -13,6 +13,7 @@
 #include <alloca.h>
 #include <pthread.h>
 #include <sched.h>
+#include <unistd.h>
 
 #include "../../../../instances/plc_app.hpp"
 
@@ -85,7 +86,7 @@ __attribute__((noinline)) void loop() {
   while (zero == 0) sink = sink + 1;
 }
 __attribute__((noinline)) void sleep_for_ever() {
-  while (zero == 0) std::this_thread::sleep_for(1s);
+  while (zero == 0) ::sleep(1);
 }
 
 // A thread of the application's own that never ends; priority 0: as it comes.
