@@ -1,6 +1,7 @@
 #include "instances/runtime/application/symbol_name.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -86,8 +87,13 @@ std::string file_name(const char* path) {
 const std::vector<char>& SymbolNames::contents_of(const char* path) {
   const auto known = files_.find(std::string_view(path));
   if (known != files_.end()) return known->second;
+  // As a whole: byte by byte a large file would keep the control thread for seconds.
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  std::vector<char> contents(error ? 0 : size);
   std::ifstream file(path, std::ios::binary);
-  std::vector<char> contents{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  file.read(contents.data(), std::ssize(contents));
+  contents.resize(static_cast<std::size_t>(file.gcount()));
   return files_.emplace(path, std::move(contents)).first->second;
 }
 
