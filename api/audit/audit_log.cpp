@@ -259,8 +259,7 @@ void AuditLog::tell_sync(const std::string& problem) {
   if (problem.empty()) {
     spdlog::info(
         "the audit log in {} reaches the disk again; the records of this process since the last good sync "
-        "were "
-        "written again",
+        "were written again",
         options_.folder);
   } else {
     spdlog::error("records of the audit log may not survive a loss of power: {}", problem);

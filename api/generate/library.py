@@ -101,7 +101,7 @@ def field_of(kind, member, told, words, nested):
         between = re.search(r", with (commas|line feeds) between", member.comment)
         text = text.replace(between[0], "") if between else text
         made = ("std::vector<std::string>", f"list_in(dds::text_of({from_sample}), {SEPARATORS[between[1]]})") if between else (
-            "std::string", f"text_in(dds::text_of({from_sample}))")
+            "std::string", f"printable_lines(dds::text_of({from_sample}))")
     elif base == "boolean":
         made = ("bool", from_sample)
     elif name.endswith("_unix_ns"):

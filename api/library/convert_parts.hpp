@@ -22,15 +22,11 @@ namespace plchost {
 // From members of samples to those of the library's types: for library_conversions.hpp, which the build
 // makes.
 
-/// Lines of UTF-8 without control characters, whatever the host or an application has written.
-[[nodiscard]] inline std::string text_in(std::string_view text) {
-  return printable_lines(text);
-}
-
 /// The parts of "a,b" between the commas, or whatever `separator` is.
 [[nodiscard]] inline std::vector<std::string> list_in(std::string_view text, char separator) {
   std::vector<std::string> words;
-  for (const auto word : std::views::split(text, separator)) words.push_back(text_in(std::string_view(word)));
+  for (const auto word : std::views::split(text, separator))
+    words.push_back(printable_lines(std::string_view(word)));
   return words;
 }
 

@@ -32,7 +32,7 @@ Client::Value value_of(const dds::FieldInfo& field, const Value& value) {
       return static_cast<unsigned long long>(value);
     }
   } else if constexpr (std::convertible_to<Value, std::string_view>) {
-    return text_in(value);
+    return printable_lines(value);
   } else {
     return fmt::format("{:02x}", fmt::join(value, ""));
   }
@@ -46,9 +46,9 @@ Client::Record record_of(const Sample& sample) {
   });
   // The members that a newer host has more.
   for (const plc_KeyValue& entry : dds::parts_of(sample.ext)) {
-    std::string name = text_in(dds::text_of(entry.name));
+    std::string name = printable_lines(dds::text_of(entry.name));
     if (std::ranges::find(record, name, &Client::Record::value_type::first) != record.end()) continue;
-    record.emplace_back(std::move(name), text_in(dds::text_of(entry.value)));
+    record.emplace_back(std::move(name), printable_lines(dds::text_of(entry.value)));
   }
   return record;
 }

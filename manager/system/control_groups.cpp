@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <utility>
 
 #include <fmt/format.h>
 #include <linux/magic.h>
@@ -246,15 +247,19 @@ void ControlGroups::end(const std::string& name) {
 }
 
 void ControlGroups::end_all(std::string_view prefix) {
-  if (!problem_.empty()) return;
+  for (const std::string& name : with_prefix(prefix)) end(name);
+}
+
+std::vector<std::string> ControlGroups::with_prefix(std::string_view prefix) const {
   std::vector<std::string> found;
+  if (!problem_.empty()) return found;
   std::error_code error;
   for (std::filesystem::directory_iterator at(folder_, error), end; !error && at != end;
        at.increment(error)) {
-    const std::string name = at->path().filename();
-    if (name.starts_with(prefix)) found.push_back(name);
+    std::string name = at->path().filename();
+    if (name.starts_with(prefix)) found.push_back(std::move(name));
   }
-  for (const std::string& name : found) end(name);
+  return found;
 }
 
 bool ControlGroups::remove_ended() {
@@ -263,12 +268,7 @@ bool ControlGroups::remove_ended() {
 }
 
 void ControlGroups::remove_empty(std::string_view prefix) const {
-  if (!problem_.empty()) return;
-  std::error_code error;
-  for (std::filesystem::directory_iterator at(folder_, error), end; !error && at != end;
-       at.increment(error)) {
-    if (at->path().filename().native().starts_with(prefix)) (void)::rmdir(at->path().c_str());
-  }
+  for (const std::string& name : with_prefix(prefix)) (void)::rmdir(path(name).c_str());
 }
 
 std::string TrialGroup::begin() const {

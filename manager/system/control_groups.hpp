@@ -91,6 +91,7 @@ class ControlGroups {
   void look_at_folder(bool named);
   void enable_controllers();
   [[nodiscard]] std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  [[nodiscard]] std::vector<std::string> with_prefix(std::string_view prefix) const;
 
   std::string folder_;
   std::string problem_;

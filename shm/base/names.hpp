@@ -104,4 +104,10 @@ struct FixedText {
   }
 };
 
+/// Makes a text that a stranger may have written what printable() makes of it.
+template <std::size_t Max>
+void replace_unprintable(FixedText<Max>& text) {
+  if (!is_printable_utf8(text.view())) text.assign(printable(std::string(text.view())));
+}
+
 }  // namespace plchost

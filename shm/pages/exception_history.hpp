@@ -44,7 +44,7 @@ struct ExceptionHistory {
   bool operator==(const ExceptionHistory&) const = default;
 };
 
-/// Without symbols, which only the process can find: its back-trace has addresses.
+/// Without symbols and back-trace, which only the process can find.
 [[nodiscard]] ExceptionEntry exception_entry(const FaultRecord& record, std::string_view application,
                                              std::string_view task);
 

@@ -90,9 +90,7 @@ LogSlice LogRingReader::read(std::uint64_t after, std::size_t most) const {
     auto record = page_.get(number);
     // Overtaken meanwhile, or written by a stranger.
     if (!record || !is_known(*record)) continue;
-    if (!is_printable_utf8(record->text.view())) {
-      record->text.assign(printable(std::string(record->text.view())));
-    }
+    replace_unprintable(record->text);
     slice.records.push_back(*record);
   }
   return slice;

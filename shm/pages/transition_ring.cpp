@@ -17,16 +17,6 @@ namespace plchost {
 
 static_assert(offsetof(TransitionRingLayout, version) == 8 && sizeof(Transition) == 232);
 
-namespace {
-
-Transition with_printable_reason(Transition transition) {
-  const std::string_view reason = transition.reason.view();
-  if (!is_printable_utf8(reason)) transition.reason.assign(printable(std::string(reason)));
-  return transition;
-}
-
-}  // namespace
-
 std::string_view to_string(TransitionSource source) noexcept {
   switch (source) {
     case TransitionSource::application:
@@ -96,14 +86,16 @@ std::optional<Transition> TransitionRingReader::next(TimePoint now) {
     const std::uint64_t last = page_.last();
     if (next_ > last) return std::nullopt;
     if (last - next_ >= kTransitionsKept) next_ = last - kTransitionsKept + 1;
-    const auto found = page_.get(next_);
+    auto found = page_.get(next_);
     if (!found) {
       if (!waits_since_) waits_since_ = now;
       if (now - *waits_since_ < kWriterGone) return std::nullopt;
     }
     waits_since_.reset();
     ++next_;
-    if (found) return with_printable_reason(*found);
+    if (!found) continue;
+    replace_unprintable(found->reason);
+    return found;
   }
 }
 

@@ -17,6 +17,7 @@
 
 #include "api/audit/audit_check.hpp"
 #include "api/audit/audit_log.hpp"
+#include "tests/integration/storage/stop_record.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -38,12 +39,6 @@ class LogOnABadDisk : public testing::Test {
     ::unsetenv("DISK_FAULT");       // NOLINT(concurrency-mt-unsafe)
     ::unsetenv("RECORDED_FOLDER");  // NOLINT(concurrency-mt-unsafe)
     fs::remove_all(root_);
-  }
-  static AuditRecord stop_of(const std::string& instance) {
-    AuditRecord record;
-    record.what = "stop";
-    record.on = instance;
-    return record;
   }
   [[nodiscard]] std::unique_ptr<AuditLog> open() const {
     auto log = AuditLog::open({.folder = folder_});

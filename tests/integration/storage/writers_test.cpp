@@ -22,6 +22,7 @@
 #include "manager/store/wish_folder.hpp"
 #include "shm/files/replace_file.hpp"
 #include "tests/integration/storage/recorded_folder.hpp"
+#include "tests/integration/storage/stop_record.hpp"
 
 namespace plchost {
 namespace {
@@ -125,12 +126,6 @@ TEST_F(StoreUnderPowerCuts, KeepsApplicationsAndTheBootChoice) {
 
 class LogUnderPowerCuts : public WritersUnderPowerCuts {
  protected:
-  static AuditRecord stop_of(const std::string& instance) {
-    AuditRecord record;
-    record.what = "stop";
-    record.on = instance;
-    return record;
-  }
   [[nodiscard]] std::unique_ptr<AuditLog> open() const {
     auto log = AuditLog::open({.folder = path("state/audit.cell"), .file_bytes = 3000, .most_files = 3});
     EXPECT_TRUE(log) << log.error().describe();
