@@ -20,6 +20,7 @@
 #include "api/cli/rows/statistics_rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/client/log_reader.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
