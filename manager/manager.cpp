@@ -171,10 +171,13 @@ Result<void> Manager::set_up() {
   share_folders();  // last: folders that instances may not write are there by now
   if (auto ours = check_pool_owner(host.pool, rights); !ours) return ours;
   PLCHOST_TRY_ASSIGN(auto pool,
-                     ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = rights}));
+                     ObjectPool::create(host.pool, {.max_objects = host.pool_objects,
+                                                    .rights = rights,
+                                                    .across_containers = host.pool_across_containers}));
   if (auto renewed = renew_pool_rights(host.pool, rights); !renewed) {
     spdlog::warn("{}", renewed.error().describe());
   }
+  warn_of_another_kind(pool, host);
   pool_ = std::move(pool);
   PLCHOST_TRY_ASSIGN(page_, HostPageWriter::create(host.pool));
   auto signals = reactor_->watch_signals({SIGTERM, SIGINT, SIGHUP}, [this](int signal) {

@@ -12,6 +12,8 @@
 #include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/foreign_files.hpp"
+#include "shm/pool/client_locks.hpp"
+#include "shm/pool/object_pool.hpp"
 
 namespace plchost {
 
@@ -69,6 +71,7 @@ Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& righ
   if (!fd || ::fstat(fd.get(), &before) != 0) {
     return failure(ErrorCode::system, fmt::format("cannot read the rights of pool '{}'", pool), errno);
   }
+  PLCHOST_TRY(ClientLocks::renew_rights(pool, rights));
   if (has(before, rights)) return {};
   const std::string had = describe_rights(before.st_uid, before.st_gid, before.st_mode);
   PLCHOST_TRY(in_step(fmt::format("pool '{}' keeps {}", pool, had), give_rights(fd.get(), rights, path)));
@@ -77,6 +80,14 @@ Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& righ
   spdlog::info("pool '{}' had {}; it has {} now", pool, had,
                describe_rights(now.st_uid, now.st_gid, now.st_mode));
   return {};
+}
+
+void warn_of_another_kind(const ObjectPool& pool, const HostConfig& host) {
+  if (pool.across_containers() == host.pool_across_containers) return;
+  spdlog::warn(
+      "pool '{}' was made with [host] pool_across_containers = {} and stays so; for {} stop the manager and "
+      "all programs that use the pool, remove {} and start the manager",
+      pool.name(), pool.across_containers(), host.pool_across_containers, MemoryFile::path(pool.name()));
 }
 
 }  // namespace plchost

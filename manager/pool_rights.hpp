@@ -11,6 +11,8 @@
 
 namespace plchost {
 
+class ObjectPool;
+
 /// Refuses a pool that is there already and belongs to a user who is neither this one, nor root, nor the
 /// configured owner. Otherwise the user that makes a file in /dev/shm first could own all that instances
 /// share.
@@ -27,5 +29,9 @@ void clear_names(const std::string& pool, const MemoryRights& rights, std::optio
 /// already keep their rights; a process that has it mapped keeps it. refused, system: the pool keeps the
 /// rights it has.
 [[nodiscard]] Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& rights);
+
+/// Says in the log that a pool that was there already is for several containers, or is not, and
+/// [host] pool_across_containers wants the other. Set-up.
+void warn_of_another_kind(const ObjectPool& pool, const HostConfig& host);
 
 }  // namespace plchost

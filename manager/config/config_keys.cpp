@@ -81,6 +81,12 @@ constexpr std::array kHostKeys = {
          .when = next_manager,
          .why = "its instances have the pool mapped",
          .meaning = "room in the pool"}),
+    host<&HostConfig::pool_across_containers, TruthKey>(
+        {.name = "pool_across_containers",
+         .when = next_manager,
+         .why = "its instances have the pool mapped",
+         .meaning = "programs of other containers (PID namespaces) may use the pool. Its mutexes then do not "
+                    "inherit priority. A pool that is there already stays as it is"}),
     host<&HostConfig::pool_owner, TextKey<UserRule>>({.name = "pool_owner",
                                                       .when = at_once,
                                                       .why = kOfNewObjects,

@@ -35,7 +35,8 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
   const auto begins = [&](const std::string& begin) { return file.starts_with(begin); };
   const std::array of_manager = {transition_ring_name(pool, ""), log_ring_name(pool, ""),
                                  fmt::format("{}.wish.", pool)};
-  if (file == pool || file == host_page_name(pool) || std::ranges::any_of(of_manager, begins)) {
+  if (file == pool || file == fmt::format("{}.clients", pool) || file == host_page_name(pool) ||
+      std::ranges::any_of(of_manager, begins)) {
     return Owners::manager;
   }
   const std::array of_instances = {instance_page_name(pool, ""), instance_claim_name(pool, ""),

@@ -12,11 +12,11 @@ namespace plchost {
 
 /// A process that holds an object.
 struct ReferenceInfo {
-  std::uint32_t pid = 0;
+  std::uint32_t pid = 0;  ///< in the PID namespace of the caller; 0: it cannot be seen from there
   std::string program;
   bool writable = false;
   std::uint32_t waiting = 0;  ///< so many of its threads wait for the object
-  // Of the process, see ProcessIdentity.
+  // Of the process, see ProcessIdentity. Of a pool across containers: its ClientLocks::number(), and 0.
   std::uint64_t start = 0;
   std::uint32_t image = 0;
 };
@@ -38,6 +38,8 @@ struct ObjectInfo {
   /// At most kMostReferencesTold of them.
   std::vector<ReferenceInfo> references;
   std::uint32_t reference_count = 0;
+  /// Mutex of a pool across containers: of the process that holds it, as `start` of its reference; 0: none.
+  std::uint32_t holder = 0;
 };
 
 inline constexpr std::uint32_t kMostReferencesTold = 64;

@@ -1,7 +1,11 @@
 #include "shm/pool/object_listing.hpp"
 
 #include <algorithm>
+#include <map>
 #include <utility>
+
+#include "shm/pool/pool_mutex.hpp"
+#include "shm/pool/pool_segment.hpp"
 
 namespace plchost {
 
@@ -50,7 +54,8 @@ std::uint64_t ObjectHolders::key_of(const PoolView& view, const ObjectEntry& obj
   return std::uint64_t{view.link_to(object)} << 32U | Binding::generation(object.binding.load(kRelaxed));
 }
 
-ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry, const ObjectHolders& holders) {
+ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry, const ObjectHolders& holders,
+                           bool across) {
   const auto type = static_cast<ObjectType>(entry.type.load(kRelaxed));
   const ObjectTraits* const traits = traits_of(type);
   const std::uint64_t binding = entry.binding.load(std::memory_order_acquire);
@@ -68,8 +73,26 @@ ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry, const
                   .made_unix_ns = entry.made_unix_ns.load(kRelaxed),
                   .references = holders.find(view, entry),
                   .reference_count = entry.reference_count.load(kRelaxed)};
+  if (across && type == ObjectType::mutex) {
+    const ClientMutex& mutex = PoolMutex::across(entry.mutex);
+    info.value = mutex.thread();
+    info.holder = info.value != 0 ? mutex.client() : 0;
+  }
   for (const ReferenceInfo& reference : info.references) info.waiters += reference.waiting;
   return info;
+}
+
+// The kernel is asked once for each process.
+void number_as_seen(const PoolSegment& segment, std::span<ObjectInfo> objects) {
+  if (!segment.across_containers()) return;
+  std::map<std::uint64_t, pid_t> known;
+  for (ObjectInfo& object : objects) {
+    for (ReferenceInfo& reference : object.references) {
+      const auto [seen, is_new] = known.try_emplace(reference.start, 0);
+      if (is_new) seen->second = segment.seen_as(reference.start);
+      reference.pid = static_cast<std::uint32_t>(seen->second);
+    }
+  }
 }
 
 }  // namespace plchost

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -10,6 +11,8 @@
 #include "shm/pool/pool_view.hpp"
 
 namespace plchost {
+
+class PoolSegment;
 
 /// The processes that hold objects, at most kMostReferencesTold for each. They are collected from the table
 /// of references part by part: the owner of the pool's mutex may let others have it in between. Set-up.
@@ -30,8 +33,13 @@ class ObjectHolders {
   std::unordered_map<std::uint64_t, std::vector<ReferenceInfo>> of_;
 };
 
-/// With the pool's mutex held, or on what may change meanwhile: then the caller looks again.
+/// `across`: of a pool across containers. The numbers of its processes are not known yet: see start of
+/// ReferenceInfo. With the pool's mutex held, or on what may change meanwhile: then the caller looks again.
 [[nodiscard]] ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry,
-                                         const ObjectHolders& holders);
+                                         const ObjectHolders& holders, bool across);
+
+/// Of a pool across containers: gives each holder the number that it has in the PID namespace of the caller.
+/// Without the lock.
+void number_as_seen(const PoolSegment& segment, std::span<ObjectInfo> objects);
 
 }  // namespace plchost

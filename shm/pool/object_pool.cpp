@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <span>
 #include <thread>
 
 #include <fmt/format.h>
@@ -111,6 +112,19 @@ Result<ObjectPool> ObjectPool::create(const std::string& name, const PoolOptions
 Result<ObjectPool> ObjectPool::attach(const std::string& name, Access access) {
   PLCHOST_TRY_ASSIGN(auto segment, PoolSegment::attach(name, access));
   return ObjectPool(std::move(segment));
+}
+
+void ObjectPool::remove(const std::string& name) noexcept {
+  MemoryFile::remove(name);
+  MemoryFile::remove(ClientLocks::file_name(name));
+}
+
+bool ObjectPool::across_containers() const noexcept {
+  return segment_->across_containers();
+}
+
+bool ObjectPool::has_ended(const ReferenceInfo& holder) const noexcept {
+  return segment_->has_ended(holder);
 }
 
 const std::string& ObjectPool::name() const noexcept {
@@ -446,7 +460,7 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
     const auto used = view.used_entries();
     for (std::size_t i = at; i < std::min(at + kObjects, used.size()); ++i) {
       if (PoolTable::is_valid(used[i]) && !PoolTable::is_idle(used[i])) {
-        infos.push_back(describe_object(view, used[i], holders));
+        infos.push_back(describe_object(view, used[i], holders, across_containers()));
       }
     }
     return infos;
@@ -456,6 +470,7 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
     at += kObjects;
     return at < view.used_entries().size();
   }));
+  number_as_seen(*segment_, all);
   return all;
 }
 
@@ -464,11 +479,18 @@ Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
   const PoolView& view = segment_->view();
   const auto describe = [&](const ObjectEntry* entry) -> Result<ObjectInfo> {
     if (entry == nullptr || PoolTable::is_idle(*entry)) return nothing_of_that_name(name, this->name());
-    return describe_object(view, *entry, ObjectHolders::of(view, *entry));
+    return describe_object(view, *entry, ObjectHolders::of(view, *entry), across_containers());
   };
-  if (!segment_->writable()) return look_only(look_until(), [&] { return describe(segment_->peek(name)); });
-  PLCHOST_TRY_ASSIGN(auto held, segment_->lock(true));
-  return describe(segment_->find(held, name));
+  const auto look = [&]() -> Result<ObjectInfo> {
+    if (!segment_->writable()) {
+      return look_only(look_until(), [&] { return describe(segment_->peek(name)); });
+    }
+    PLCHOST_TRY_ASSIGN(auto held, segment_->lock(true));
+    return describe(segment_->find(held, name));
+  };
+  auto found = look();
+  if (found) number_as_seen(*segment_, std::span(&*found, 1));
+  return found;
 }
 
 }  // namespace plchost

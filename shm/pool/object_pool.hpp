@@ -27,6 +27,9 @@ struct PoolOptions {
   std::uint32_t max_objects = 4096;
   /// The rights to it. Those that it was made with count.
   MemoryRights rights = {};
+  /// Its users may be in several PID namespaces, as those of containers are. Then its mutexes do not inherit
+  /// priority. The way that it was made counts.
+  bool across_containers = false;
 };
 
 /// For an object that is made.
@@ -75,7 +78,7 @@ class ObjectPool {
   /// not_found: no pool of that name. Waits a moment for one that is just being made. To read only is to
   /// list, to see events and semaphores, and to map memories that allow it.
   [[nodiscard]] static Result<ObjectPool> attach(const std::string& name, Access access = Access::read_write);
-  static void remove(const std::string& name) noexcept { MemoryFile::remove(name); }
+  static void remove(const std::string& name) noexcept;
 
   /// The event of that name, made if it is not there, then neither registered nor bound. When the table is
   /// full, it takes the place of one that is neither; full: there is none. wrong_type: the name is taken.
@@ -162,6 +165,10 @@ class ObjectPool {
   PoolFindings tidy() noexcept;
 
   [[nodiscard]] const std::string& name() const noexcept;
+  /// See PoolOptions.
+  [[nodiscard]] bool across_containers() const noexcept;
+  /// The process that holds an object, by what a list says of it, has ended since. Set-up.
+  [[nodiscard]] bool has_ended(const ReferenceInfo& holder) const noexcept;
   /// How many objects it can hold.
   [[nodiscard]] std::uint32_t capacity() const noexcept;
   /// Another number after each call that may have changed something, of any process. Any context.

@@ -35,6 +35,9 @@ inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
 /// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed. 4:
 /// the PID namespace. 5: events say whether posts are taken, and are marked. 6: references are a flat table.
 inline constexpr std::uint32_t kPoolVersion = 6;
+/// The same layout, of a pool whose users may be in several PID namespaces. The mutexes are
+/// ClientMutexes, and whether a client runs is told by ClientLocks. Programs that do not know it refuse it.
+inline constexpr std::uint32_t kPoolVersionAcross = 7;
 
 /// Of what the pool's mutex orders, or what is checked after it was read without it.
 inline constexpr auto kRelaxed = std::memory_order_relaxed;
@@ -61,10 +64,10 @@ struct alignas(64) ObjectEntry {
   std::atomic<std::uint64_t> binding;
   CountingSemaphore semaphore;
   std::atomic<std::uint32_t> state;  ///< an EntryState; written last when the object is made
-  RobustMutex mutex;
-  std::atomic<std::uint64_t> size;  ///< memory: bytes
-  std::atomic<std::uint32_t> type;  ///< an ObjectType
-  Link next;                        ///< in the chain of the bucket, or of the free list
+  RobustMutex mutex;                 ///< see PoolMutex
+  std::atomic<std::uint64_t> size;   ///< memory: bytes
+  std::atomic<std::uint32_t> type;   ///< an ObjectType
+  Link next;                         ///< in the chain of the bucket, or of the free list
   std::atomic<std::uint32_t> reserved;
   std::atomic<std::uint32_t> reference_count;
 
@@ -90,11 +93,11 @@ inline constexpr std::uint32_t kAdopted = 4;  ///< memory: its file was there fi
 
 /// One user of the pool: an ObjectPool in a process.
 struct alignas(64) ClientSlot {
-  std::atomic<std::uint32_t> pid;         ///< 0: free; written last
+  std::atomic<std::uint32_t> pid;         ///< as the process itself sees it; 0: free; written last
   std::atomic<std::uint32_t> generation;  ///< grows with each client of the slot
-  std::atomic<std::uint64_t> start;       ///< of the process, see start_of()
-  std::atomic<std::int64_t> looked_ns;    ///< CLOCK_MONOTONIC when it was last seen alive
-  std::atomic<std::uint32_t> released;    ///< so many places of references were searched for those it had
+  std::atomic<std::uint64_t> start;     ///< of the process, see start_of(); across: its ClientLocks::number()
+  std::atomic<std::int64_t> looked_ns;  ///< CLOCK_MONOTONIC when it was last seen alive
+  std::atomic<std::uint32_t> released;  ///< so many places of references were searched for those it had
   std::atomic<std::uint32_t> reference_count;
   std::atomic<std::uint32_t> ended;  ///< 1: its references are being released
   std::atomic<std::uint32_t> image;  ///< of the process, see image_of()
@@ -125,10 +128,11 @@ struct alignas(64) PoolHeader {
   std::uint32_t max_clients;
   std::uint32_t max_references;
   /// Of all clients, see plchost::pid_namespace(). All numbers of processes here are of that namespace.
+  /// Across: the number of the file of the locks of all clients, see ClientLocks::make().
   std::uint64_t pid_namespace;
   std::array<std::uint32_t, 4> reserved0;
 
-  alignas(64) RobustMutex mutex;  ///< guards set-up only
+  alignas(64) RobustMutex mutex;  ///< guards set-up only; see PoolMutex
   /// Odd while a process changes the data that the mutex guards: for readers without the right to write.
   std::atomic<std::uint64_t> changes;
   std::array<std::uint32_t, 2> reserved1;
@@ -149,11 +153,12 @@ struct alignas(64) PoolHeader {
   std::atomic<std::uint32_t> client_high_water;
   std::atomic<std::uint32_t> departed;  ///< clients that ended without releasing what they held
   Link unsettled;  ///< the object that is being made or taken away, with its file if it is a memory
-  std::atomic<std::uint32_t> rebuilding;     ///< 1: the lists are being made anew
-  std::atomic<std::uint32_t> rebuilds;       ///< how often they were, because a stranger had damaged them
-  std::atomic<std::uint32_t> lost_objects;   ///< objects that were not valid then
-  std::atomic<std::uint32_t> header_mended;  ///< how often what write_constants() writes was written anew
-  std::array<std::uint32_t, 3> reserved3;
+  std::atomic<std::uint32_t> rebuilding;      ///< 1: the lists are being made anew
+  std::atomic<std::uint32_t> rebuilds;        ///< how often they were, because a stranger had damaged them
+  std::atomic<std::uint32_t> lost_objects;    ///< objects that were not valid then
+  std::atomic<std::uint32_t> header_mended;   ///< how often what write_constants() writes was written anew
+  std::atomic<std::uint32_t> client_numbers;  ///< across: the next one; see ClientLocks. Not guarded
+  std::array<std::uint32_t, 2> reserved3;
 
   alignas(64) std::atomic<std::uint32_t> noted;  ///< of the notes, those that count
   std::uint32_t reserved4;

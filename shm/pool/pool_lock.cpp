@@ -11,7 +11,7 @@ namespace plchost {
 
 namespace {
 
-std::string describe_holder(std::uint32_t thread) {
+std::string describe_thread(std::uint32_t thread) {
   const auto owner = owner_of_thread(thread);
   if (!owner) return fmt::format("thread {}", thread);
   return fmt::format("process {} ({})", owner->pid, owner->program);
@@ -32,8 +32,8 @@ bool has_mapped(std::uint32_t thread, const std::string& pool) {
 
 // Only the thread that holds the mutex writes `changes`; one that ended has left it odd. Sequentially
 // consistent, so that no later store is seen before it.
-PoolLock::PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept
-    : header_(&header), journal_(&journal), owner_died_(owner_died) {
+PoolLock::PoolLock(PoolMutex mutex, PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept
+    : mutex_(mutex), header_(&header), journal_(&journal), owner_died_(owner_died) {
   header.changes.fetch_or(1);
 }
 
@@ -41,24 +41,26 @@ PoolLock::~PoolLock() {
   if (header_ == nullptr) return;
   journal_->commit();
   header_->changes.fetch_add(1);
-  header_->mutex.unlock();
+  mutex_.unlock();
 }
 
-Result<PoolLock> PoolLock::acquire(PoolHeader& header, PoolJournal& journal, const std::string& pool,
-                                   Duration patience) {
-  switch (header.mutex.lock(MonotonicClock::now() + patience)) {
+Result<PoolLock> PoolLock::acquire(PoolMutex mutex, PoolHeader& header, PoolJournal& journal,
+                                   const PoolClients& clients, const std::string& pool, Duration patience) {
+  switch (mutex.lock(MonotonicClock::now() + patience)) {
     case LockResult::locked:
-      return PoolLock(header, journal, (header.changes.load(std::memory_order_relaxed) & 1) != 0);
+      return PoolLock(mutex, header, journal, (header.changes.load(std::memory_order_relaxed) & 1) != 0);
     case LockResult::owner_died:
-      return PoolLock(header, journal, true);
+      return PoolLock(mutex, header, journal, true);
     case LockResult::timed_out: {
-      const std::uint32_t holder = header.mutex.owner();
-      if (holder != 0 && !has_mapped(holder, pool) && header.mutex.take_from(holder)) {
-        return PoolLock(header, journal, true);
+      const std::uint32_t holder = mutex.holder();
+      const bool by_thread = !clients.across_containers();
+      if (by_thread && holder != 0 && !has_mapped(holder, pool) && header.mutex.take_from(holder)) {
+        return PoolLock(mutex, header, journal, true);
       }
       return failure(ErrorCode::timed_out,
                      fmt::format("pool '{}': {} holds its lock for more than {} ms; is it stopped?", pool,
-                                 describe_holder(holder), patience / std::chrono::milliseconds(1)));
+                                 by_thread ? describe_thread(holder) : clients.describe(holder),
+                                 patience / std::chrono::milliseconds(1)));
     }
     case LockResult::deadlock:
     case LockResult::corrupt:

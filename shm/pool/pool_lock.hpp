@@ -6,8 +6,10 @@
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pool/memory_trash.hpp"
+#include "shm/pool/pool_clients.hpp"
 #include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_layout.hpp"
+#include "shm/pool/pool_mutex.hpp"
 
 namespace plchost {
 
@@ -20,12 +22,15 @@ class PoolLock {
   static constexpr Duration kPatience = std::chrono::milliseconds(100);
 
   /// timed_out: another one holds it for longer than `patience`. corrupt: it was scribbled over.
-  static Result<PoolLock> acquire(PoolHeader& header, PoolJournal& journal, const std::string& pool,
+  /// `mutex`: the header's. `clients`: by which the holder is told to people.
+  static Result<PoolLock> acquire(PoolMutex mutex, PoolHeader& header, PoolJournal& journal,
+                                  const PoolClients& clients, const std::string& pool,
                                   Duration patience = kPatience);
 
   PoolLock(PoolLock&& other) noexcept
       : trash(std::move(other.trash)),
         burying(other.burying),
+        mutex_(other.mutex_),
         header_(std::exchange(other.header_, nullptr)),
         journal_(other.journal_),
         owner_died_(other.owner_died_) {}
@@ -41,7 +46,8 @@ class PoolLock {
   bool burying = false;
 
  private:
-  PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept;
+  PoolLock(PoolMutex mutex, PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept;
+  PoolMutex mutex_;
   PoolHeader* header_;
   PoolJournal* journal_;
   bool owner_died_;

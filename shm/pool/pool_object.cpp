@@ -62,6 +62,14 @@ void PoolObject::close() noexcept {
   segment_.reset();
 }
 
+bool PoolObject::across() const noexcept {
+  return segment_->across_containers();
+}
+
+PoolMutex PoolObject::mutex() const noexcept {
+  return segment_->mutex(entry_->mutex);
+}
+
 ObjectStatus PoolObject::why_not_valid() const noexcept {
   return segment_ != nullptr && segment_->lost() ? ObjectStatus::corrupt : ObjectStatus::gone;
 }
@@ -131,7 +139,7 @@ std::uint32_t SharedSemaphore::value() const noexcept {
 
 ObjectStatus SharedMutex::try_lock() const noexcept {
   if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
-  return status_of(entry().mutex.try_lock());
+  return status_of(across() ? mutex().try_lock() : entry().mutex.try_lock());
 }
 
 ObjectStatus SharedMutex::lock(TimePoint deadline) const noexcept {
@@ -139,7 +147,7 @@ ObjectStatus SharedMutex::lock(TimePoint deadline) const noexcept {
   const Waiting waiting(*this);
   for (;;) {
     const TimePoint until = next_look(deadline);
-    const LockResult result = entry().mutex.lock(until);
+    const LockResult result = across() ? mutex().lock(until) : entry().mutex.lock(until);
     if (result != LockResult::timed_out) return status_of(result);
     if (!valid()) return why_not_valid();
     if (until == deadline) return ObjectStatus::timed_out;
@@ -148,11 +156,12 @@ ObjectStatus SharedMutex::lock(TimePoint deadline) const noexcept {
 
 ObjectStatus SharedMutex::unlock() const noexcept {
   if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
-  return entry().mutex.unlock() ? ObjectStatus::done : ObjectStatus::not_owner;
+  const bool done = across() ? mutex().unlock() : entry().mutex.unlock();
+  return done ? ObjectStatus::done : ObjectStatus::not_owner;
 }
 
 std::uint32_t SharedMutex::owner() const noexcept {
-  return valid() ? entry().mutex.owner() : 0;
+  return valid() ? mutex().thread() : 0;
 }
 
 }  // namespace plchost

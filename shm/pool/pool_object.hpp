@@ -10,6 +10,7 @@
 #include "shm/files/memory_file.hpp"
 #include "shm/pool/pool_event.hpp"
 #include "shm/pool/pool_layout.hpp"
+#include "shm/pool/pool_mutex.hpp"
 
 namespace plchost {
 
@@ -74,6 +75,10 @@ class PoolObject {
   }
   [[nodiscard]] ObjectStatus why_not_valid() const noexcept;
   [[nodiscard]] ObjectEntry& entry() const noexcept { return *entry_; }
+  /// The mutex of a pool across containers. Otherwise it is the entry's, without a step between: this is for
+  /// cycles.
+  [[nodiscard]] PoolMutex mutex() const noexcept;
+  [[nodiscard]] bool across() const noexcept;
   /// A waiter can be marked in it, so that a poster wakes it.
   [[nodiscard]] bool can_be_marked() const noexcept { return reference_ != nullptr; }
 
@@ -121,7 +126,7 @@ class SharedSemaphore : public PoolObject {
   [[nodiscard]] std::uint32_t value() const noexcept;
 };
 
-/// See RobustMutex. It belongs to the thread that locked it.
+/// See PoolMutex. It belongs to the thread that locked it.
 class SharedMutex : public PoolObject {
  public:
   static constexpr ObjectType kType = ObjectType::mutex;

@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include "shm/base/names.hpp"
-#include "shm/base/process_start.hpp"
 #include "shm/files/memory_file.hpp"
 
 namespace plchost {
@@ -20,20 +19,19 @@ namespace {
 /// The processes that hold references, and go on.
 class Holders {
  public:
-  explicit Holders(pid_t that_ends) noexcept : that_ends_(static_cast<std::uint32_t>(that_ends)) {}
+  Holders(const ObjectPool& pool, pid_t that_ends) noexcept
+      : pool_(pool), that_ends_(static_cast<std::uint32_t>(that_ends)) {}
   /// One whose references nobody has released yet may have ended.
   [[nodiscard]] bool goes_on(const ReferenceInfo& reference) {
-    if (reference.pid == that_ends_) return false;
+    if (reference.pid != 0 && reference.pid == that_ends_) return false;
     const auto [known, is_new] =
         goes_on_.try_emplace(std::tuple(reference.pid, reference.start, reference.image), false);
-    if (is_new) {
-      known->second = !process_has_ended(
-          {.pid = static_cast<pid_t>(reference.pid), .image = reference.image, .start = reference.start});
-    }
+    if (is_new) known->second = !pool_.has_ended(reference);
     return known->second;
   }
 
  private:
+  const ObjectPool& pool_;
   std::uint32_t that_ends_;
   // By pid, start and image: a dead process and a running one may have the same pid.
   std::map<std::tuple<std::uint32_t, std::uint64_t, std::uint32_t>, bool> goes_on_;
@@ -77,7 +75,7 @@ Result<PoolRoom> PoolRoom::of(const ObjectPool& pool, std::string_view instance,
   PLCHOST_TRY_ASSIGN(const auto objects, pool.list());
   PoolRoom room(pool, free_bytes);
   const std::string prefix = fmt::format("{}/", instance);
-  Holders holders(process);
+  Holders holders(pool, process);
   for (const ObjectInfo& object : objects) {
     if (!stays(object, prefix, holders)) {
       if (object.type == ObjectType::memory) {

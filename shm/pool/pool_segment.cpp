@@ -12,8 +12,10 @@
 #include "shm/files/open_or_make.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/pool/pool_clients.hpp"
+#include "shm/pool/pool_header.hpp"
 #include "shm/pool/pool_references.hpp"
 #include "shm/pool/pool_table.hpp"
+#include "shm/pool/process_pools.hpp"
 
 namespace plchost {
 
@@ -26,84 +28,51 @@ PoolHeader& header_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<PoolHeader*>(memory.bytes().data());
 }
 
-// The constants of a pool. Not by describe_page(): the header says them twice, for a process that attaches
-// after a stranger has written over one of the two.
-void write_constants(PoolHeader& header, std::uint32_t max_objects, std::uint64_t pid_namespace) noexcept {
-  header.version = kPoolVersion;
-  header.entry_size = sizeof(ObjectEntry);
-  header.size = pool_size(max_objects);
-  header.max_objects = max_objects;
-  header.bucket_count = bucket_count_for(max_objects);
-  header.max_clients = kMaxClients;
-  header.max_references = max_references_for(max_objects);
-  header.pid_namespace = pid_namespace;
-  header.pid_namespace_again = pid_namespace;
-  header.version_again = kPoolVersion;
-  header.max_objects_again = max_objects;
-  header.magic_again.store(kPoolMagic, kRelaxed);
-  header.magic.store(kPoolMagic, std::memory_order_release);
-}
-
-// Zero-filled memory holds an empty table already; only the header has something to say.
-Result<void> fill_header(std::span<std::byte> bytes, std::uint32_t max_objects) {
-  write_constants(*new (bytes.data()) PoolHeader{}, max_objects, pid_namespace());
-  return {};
-}
-
-Result<void> check_header(const PoolHeader& header, std::uint32_t max_objects, std::size_t file_size,
-                          const std::string& name) {
-  if (header.version != kPoolVersion) {
-    return failure(
-        ErrorCode::corrupt,
-        fmt::format(
-            "pool '{}' has version {}, this program needs {}; stop all processes that use it, and remove it",
-            name, header.version, kPoolVersion));
-  }
-  const bool sound = header.entry_size == sizeof(ObjectEntry) && max_objects >= kMinObjects &&
-                     max_objects <= kMaxObjects && header.bucket_count == bucket_count_for(max_objects) &&
-                     header.max_clients == kMaxClients &&
-                     header.max_references == max_references_for(max_objects) &&
-                     header.size == pool_size(max_objects) && file_size == pool_size(max_objects);
-  if (sound) return {};
-  return failure(ErrorCode::corrupt,
-                 fmt::format("pool '{}': its header does not fit its size of {} bytes", name, file_size));
-}
-
-// A stranger who writes over one of both seldom does over the other.
-bool is_sound_again(const PoolHeader& header, std::uint32_t max_objects, std::size_t file_size) noexcept {
-  return header.magic_again.load(kRelaxed) == kPoolMagic && header.version_again == kPoolVersion &&
-         max_objects >= kMinObjects && max_objects <= kMaxObjects && file_size == pool_size(max_objects);
-}
-
-// In another namespace each client would look dead to the others, and what it holds would be taken from it.
-Result<void> check_pid_namespace(const PoolHeader& header, const std::string& name) {
-  const std::uint64_t ours = pid_namespace();
-  const std::uint64_t theirs = header.pid_namespace;
-  if (theirs == ours || header.pid_namespace_again == ours) return {};
-  return failure(
-      ErrorCode::refused,
-      fmt::format(
-          "pool '{}' was made in PID namespace {}, this process is in {}: processes of two namespaces cannot "
-          "tell whether the others have ended. Start this one in the namespace of the others (of a "
-          "container: "
-          "--pid=host), or remove {} if nobody uses it any more",
-          name, theirs, ours, MemoryFile::path(name)));
+// Of the two copies in the header one may be a stranger's.
+Result<std::shared_ptr<ClientLocks>> open_locks(const PoolHeader& header, const std::string& name) {
+  auto locks = ClientLocks::open(name, header.pid_namespace_again);
+  if (locks || header.pid_namespace == header.pid_namespace_again) return locks;
+  return ClientLocks::open(name, header.pid_namespace);
 }
 
 }  // namespace
 
-PoolSegment::PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access)
+PoolSegment::PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access,
+                         bool across, std::shared_ptr<ClientLocks> locks)
     : name_(std::move(name)),
       memory_(std::move(memory)),
       view_(memory_.bytes(), max_objects),
       access_(access),
       process_(this_process()),
-      pid_namespace_(pid_namespace()),
+      across_(across),
+      pid_namespace_(locks ? locks->file() : pid_namespace()),
+      locks_(std::move(locks)),
       journal_(view_.header(), memory_.bytes().size()),
-      told_(counted()) {}
+      told_(counted()) {
+  if (locks_ && writable()) ProcessPools::of_this_process().add(view_, *locks_);
+}
+
+// The segment of a file whose header was checked.
+Result<std::shared_ptr<PoolSegment>> PoolSegment::make(const std::string& name, MemoryFile memory,
+                                                       std::uint32_t max_objects, Access access) {
+  const PoolHeader& header = header_of(memory);
+  std::shared_ptr<ClientLocks> locks;
+  const bool across = is_pool_across(header, memory.bytes().size());
+  if (across) {
+    auto opened = open_locks(header, name);
+    // To look at the pool they are not needed.
+    if (!opened && access == Access::read_write) return std::unexpected(std::move(opened).error());
+    if (opened) locks = *std::move(opened);
+  } else {
+    PLCHOST_TRY(check_pid_namespace(header, name));
+  }
+  return std::shared_ptr<PoolSegment>(
+      new PoolSegment(name, std::move(memory), max_objects, access, across, std::move(locks)));
+}
 
 // As if this client had ended: if the lock is not to be had, or it holds very much, others release the rest.
 PoolSegment::~PoolSegment() {
+  if (locks_ && writable()) ProcessPools::of_this_process().remove(view_);
   if (client_ == nullptr || process_.pid != ::getpid()) return;
   if (ClientSlot* const slot = own_client(); slot != nullptr) slot->ended.store(1, kRelaxed);
   constexpr int kAttempts = 50;
@@ -125,9 +94,8 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   const PoolHeader& header = header_of(*memory);
   const std::uint64_t magic = header.magic.load(std::memory_order_acquire);
   std::uint32_t max_objects = header.max_objects_again;
-  if (is_sound_again(header, max_objects, file_size)) {
-    PLCHOST_TRY(check_pid_namespace(header, name));
-    return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
+  if (is_pool_sound_again(header, max_objects, file_size)) {
+    return PoolSegment::make(name, std::move(*memory), max_objects, access);
   }
   if (magic == 0) return unfinished();
   if (magic != kPoolMagic) {
@@ -135,9 +103,8 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
                    fmt::format("shared memory '{}' is not a pool; choose another name", name));
   }
   max_objects = header.max_objects;
-  PLCHOST_TRY(check_header(header, max_objects, file_size, name));
-  PLCHOST_TRY(check_pid_namespace(header, name));
-  return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
+  PLCHOST_TRY(check_pool_header(header, max_objects, file_size, name));
+  return PoolSegment::make(name, std::move(*memory), max_objects, access);
 }
 
 // busy: it was not completed in time, so its maker is gone.
@@ -177,13 +144,16 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
     return pool;
   };
   const auto make = [&](bool /*replace*/) -> Result<std::shared_ptr<PoolSegment>> {
-    PLCHOST_TRY_ASSIGN(
-        auto memory, MemoryFile::create(
-                         name, pool_size(options.max_objects),
-                         [&](std::span<std::byte> bytes) { return fill_header(bytes, options.max_objects); },
-                         options.rights));
-    return std::shared_ptr<PoolSegment>(
-        new PoolSegment(name, std::move(memory), options.max_objects, Access::read_write));
+    std::uint64_t locks_file = 0;
+    if (options.across_containers) {
+      PLCHOST_TRY_ASSIGN(locks_file, ClientLocks::make(name, options.rights, owners));
+    }
+    const auto fill = [&](std::span<std::byte> bytes) {
+      return fill_pool_header(bytes, options, locks_file);
+    };
+    PLCHOST_TRY_ASSIGN(auto memory,
+                       MemoryFile::create(name, pool_size(options.max_objects), fill, options.rights));
+    return PoolSegment::make(name, std::move(memory), options.max_objects, Access::read_write);
   };
   return open_or_make(open, make, Replaces::nothing);
 }
@@ -192,9 +162,13 @@ Result<PoolLock> PoolSegment::acquire(Duration patience) {
   // A second wait for a holder that was waited for in vain just now is short.
   constexpr Duration kMoment = std::chrono::milliseconds(5);
   PoolHeader& header = view_.header();
+  if (locks_) {
+    PLCHOST_TRY(locks_->renew(header.client_numbers));
+  }
+  const PoolMutex mutex = this->mutex(header.mutex);
   const std::uint32_t stuck = stuck_.load(kRelaxed);
-  if (stuck != 0 && header.mutex.owner() == stuck) patience = std::min(patience, kMoment);
-  auto held = PoolLock::acquire(header, journal_, name_, patience);
+  if (stuck != 0 && mutex.holder() == stuck) patience = std::min(patience, kMoment);
+  auto held = PoolLock::acquire(mutex, header, journal_, clients(), name_, patience);
   if (lost()) {
     return failure(ErrorCode::corrupt,
                    fmt::format("pool '{}': another program has cut its file in {} short; its contents are "
@@ -202,7 +176,7 @@ Result<PoolLock> PoolSegment::acquire(Duration patience) {
                                name_, MemoryFile::kDirectory));
   }
   const bool in_vain = !held && held.error().code == ErrorCode::timed_out;
-  stuck_.store(in_vain ? header.mutex.owner() : 0, kRelaxed);
+  stuck_.store(in_vain ? mutex.holder() : 0, kRelaxed);
   if (!held) return held;
   mend_header();
   if (held->owner_died()) repair(*held);
@@ -231,10 +205,9 @@ Result<PoolLock> PoolSegment::lock(bool look_thoroughly, Duration patience) {
       PoolLock& held;
       std::size_t left = kPiece;
     } burial{.segment = *this, .held = *held};
-    const bool all = PoolClients(view_, journal_)
-                         .sweep(now, look_thoroughly || held->owner_died(), [&burial](ClientSlot& client) {
-                           return burial.segment.bury(burial.held, client, burial.left);
-                         });
+    const bool all = clients().sweep(
+        now, look_thoroughly || held->owner_died(),
+        [&burial](ClientSlot& client) { return burial.segment.bury(burial.held, client, burial.left); });
     held->burying = !all;
     if (all || now >= until) return held;
   }
@@ -246,11 +219,12 @@ void PoolSegment::mend_header() noexcept {
   PoolHeader& header = view_.header();
   const std::size_t size = pool_size(max_objects);
   const bool sound = header.magic.load(kRelaxed) == kPoolMagic &&
-                     check_header(header, header.max_objects, size, name_).has_value() &&
-                     is_sound_again(header, header.max_objects_again, size) &&
+                     check_pool_header(header, header.max_objects, size, name_).has_value() &&
+                     is_pool_sound_again(header, header.max_objects_again, size) &&
+                     header.version == version() && header.version_again == version() &&
                      header.pid_namespace == pid_namespace_ && header.pid_namespace_again == pid_namespace_;
   if (sound) return;
-  write_constants(header, max_objects, pid_namespace_);
+  write_pool_constants(header, version(), max_objects, pid_namespace_);
   header.header_mended.fetch_add(1, kRelaxed);
 }
 
@@ -312,21 +286,34 @@ void PoolSegment::rebuild(PoolLock& held) noexcept {
 }
 
 ClientSlot* PoolSegment::own_client() const noexcept {
-  const bool ours = client_ != nullptr &&
-                    client_->pid.load(kRelaxed) == static_cast<std::uint32_t>(process_.pid) &&
-                    client_->generation.load(kRelaxed) == client_generation_;
+  const bool ours =
+      client_ != nullptr && client_->pid.load(kRelaxed) == static_cast<std::uint32_t>(process_.pid) &&
+      client_->generation.load(kRelaxed) == client_generation_ &&
+      (!locks_ || client_->start.load(kRelaxed) == locks_->number(view_.header().client_numbers));
   return ours ? client_ : nullptr;
 }
 
 Result<ClientSlot*> PoolSegment::client() {
   if (ClientSlot* const slot = own_client(); slot != nullptr) return slot;
-  client_ = PoolClients(view_, journal_).join(process_, program_name());
+  if (locks_) process_.start = locks_->number(view_.header().client_numbers);
+  client_ = clients().join(process_, program_name());
   if (client_ == nullptr) {
     return failure(ErrorCode::full,
                    fmt::format("pool '{}' has {} users, no more are possible", name_, kMaxClients));
   }
   client_generation_ = client_->generation.load(kRelaxed);
   return client_;
+}
+
+bool PoolSegment::has_ended(const ReferenceInfo& client) const noexcept {
+  const ProcessIdentity process{
+      .pid = static_cast<pid_t>(client.pid), .image = client.image, .start = client.start};
+  return knows_clients() && client_has_ended(process, locks_.get());
+}
+
+pid_t PoolSegment::seen_as(std::uint64_t client_number) const noexcept {
+  const bool possible = locks_ != nullptr && client_number <= ClientMutex::kMaxClient;
+  return possible ? locks_->seen_as(static_cast<std::uint32_t>(client_number)) : 0;
 }
 
 ObjectEntry* PoolSegment::peek(std::string_view name) const noexcept {

@@ -15,9 +15,12 @@
 #include "shm/base/process_start.hpp"
 #include "shm/base/result.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/pool/client_locks.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/pool/pool_clients.hpp"
 #include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_lock.hpp"
+#include "shm/pool/pool_mutex.hpp"
 #include "shm/pool/pool_table.hpp"
 #include "shm/pool/pool_view.hpp"
 
@@ -43,7 +46,20 @@ class PoolSegment {
   /// The file was cut short by a stranger.
   [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
   /// The process that changes the pool has ended over it, and none has come since. Set-up; only reads.
-  [[nodiscard]] bool holder_has_ended() const noexcept { return view_.header().mutex.owner_has_ended(); }
+  [[nodiscard]] bool holder_has_ended() const noexcept {
+    return knows_clients() && mutex(view_.header().mutex).holder_has_ended();
+  }
+  /// Its users may be in several PID namespaces.
+  [[nodiscard]] bool across_containers() const noexcept { return across_; }
+  /// The mutex of an object of the pool, or the header's, as this process uses it. Any context. Across
+  /// containers a process that only reads may not use it.
+  [[nodiscard]] PoolMutex mutex(RobustMutex& place) const noexcept {
+    return {place, locks_.get(), view_.header().client_numbers};
+  }
+  /// The process that an entry of a list is about has ended. Set-up.
+  [[nodiscard]] bool has_ended(const ReferenceInfo& client) const noexcept;
+  /// Across containers: the number that it has here; 0: it has ended, or cannot be seen. Set-up.
+  [[nodiscard]] pid_t seen_as(std::uint64_t client_number) const noexcept;
 
   /// Its holder finds no unfinished step. The references of ended clients are released: as many as can be
   /// released in `kBurial` (others have their turn meanwhile), the rest is for the next one. refused: mapped
@@ -77,7 +93,10 @@ class PoolSegment {
   void release(ReferenceEntry& reference, std::uint32_t generation) noexcept;
 
  private:
-  PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access);
+  PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access, bool across,
+              std::shared_ptr<ClientLocks> locks);
+  static Result<std::shared_ptr<PoolSegment>> make(const std::string& name, MemoryFile memory,
+                                                   std::uint32_t max_objects, Access access);
   static Result<std::shared_ptr<PoolSegment>> attach_now(const std::string& name, Access access,
                                                          const OwnerCheck& owners);
   static Result<std::shared_ptr<PoolSegment>> attach_patiently(const std::string& name, Access access,
@@ -95,19 +114,25 @@ class PoolSegment {
   void release_one(PoolLock& held, ReferenceEntry& reference) noexcept;
 
   [[nodiscard]] PoolFindings counted() const noexcept;
+  [[nodiscard]] std::uint32_t version() const noexcept { return across_ ? kPoolVersionAcross : kPoolVersion; }
+  [[nodiscard]] PoolClients clients() noexcept { return {view_, journal_, locks_.get()}; }
+  // False: across containers, and it may only read.
+  [[nodiscard]] bool knows_clients() const noexcept { return !across_ || locks_ != nullptr; }
 
   std::string name_;
   MemoryFile memory_;
   PoolView view_;
   Access access_;
   ProcessIdentity process_;
-  std::uint64_t pid_namespace_;
+  const bool across_;
+  const std::uint64_t pid_namespace_;  // or the file of the locks: see PoolHeader
+  std::shared_ptr<ClientLocks> locks_;
   // Guarded by the pool's mutex.
   PoolJournal journal_;
   ClientSlot* client_ = nullptr;  // that this client has
   std::uint32_t client_generation_ = 0;
   /// The holder of the lock when a thread of this process has waited for it in vain: it is not waited for
-  /// again as long. 0: no thread.
+  /// again as long. 0: none.
   std::atomic<std::uint32_t> stuck_{0};
   PoolFindings told_;
   /// The references that could not be released, since the lock was not to be had.

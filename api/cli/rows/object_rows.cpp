@@ -27,7 +27,13 @@ const ObjectTraits& shown_as(const ListedObject& object) {
 
 std::string holder_text(const plc_ObjectRecord& mutex) {
   if (mutex.value == 0) return "free";
-  if (mutex.holder_pid == 0) return fmt::format("held by thread {}, which has ended", mutex.value);
+  if (mutex.holder_pid == 0 && mutex.holder_program[0] == '\0') {
+    return fmt::format("held by thread {}, which has ended", mutex.value);
+  }
+  if (mutex.holder_pid == 0) {
+    return fmt::format("held by {} of another container, thread {} there", dds::text_of(mutex.holder_program),
+                       mutex.value);
+  }
   return fmt::format("held by {}({}), thread {}", dds::text_of(mutex.holder_program), mutex.holder_pid,
                      mutex.value);
 }
@@ -46,7 +52,9 @@ std::string holders_text(const ListedObject& object, std::size_t most) {
   std::string text;
   const std::size_t told = std::min(most, object.references.size());
   for (const plc_ObjectReference& reference : std::span(object.references).first(told)) {
-    text += fmt::format("{}{}({})", text.empty() ? "" : ", ", dds::text_of(reference.program), reference.pid);
+    text += text.empty() ? "" : ", ";
+    text += reference.pid == 0 ? fmt::format("{}(of another container)", dds::text_of(reference.program))
+                               : fmt::format("{}({})", dds::text_of(reference.program), reference.pid);
   }
   const std::uint32_t all = object.record.reference_count;
   if (all > told && told > 0) text += fmt::format(" and {} more", all - told);

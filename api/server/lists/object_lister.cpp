@@ -34,6 +34,13 @@ ObjectUsers users_of(const ObjectInfo& object) {
   ObjectUsers users{.owner_name = user_name(object.owner), .group_name = group_name(object.group)};
   const ObjectTraits* const traits = traits_of(object.type);
   if (traits == nullptr || !traits->has_holder || object.value == 0) return users;
+  if (object.holder != 0) {
+    const auto holder = std::ranges::find(object.references, object.holder, &ReferenceInfo::start);
+    if (holder == object.references.end()) return users;
+    users.holder_pid = holder->pid;
+    users.holder_program = holder->program;
+    return users;
+  }
   auto owner = owner_of_thread(static_cast<std::uint32_t>(object.value));
   if (!owner || !may_hold(object, owner->pid)) return users;
   users.holder_pid = owner->pid;

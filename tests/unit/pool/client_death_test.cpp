@@ -23,7 +23,7 @@
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_layout.hpp"
 #include "tests/support/sanitized.hpp"
-#include "tests/unit/pool/pool_invariants.hpp"
+#include "tests/unit/pool/pool_storm.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -278,33 +278,6 @@ TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
   EXPECT_TRUE(pool_.create_semaphore("s", 1)->made);
 }
 
-/// The calls of a client that is killed in the midst of one: all kinds of calls, in a random order.
-[[noreturn]] void storm(const std::string& name, unsigned seed) {
-  auto pool = std::move(ObjectPool::attach(name).value());
-  const auto shared = [&](const char* kind) { return kind + std::to_string(seed++ * 7 % 5); };
-  for (;;) {
-    const auto soon = [] { return MonotonicClock::now() + std::chrono::microseconds(50); };
-    if (const auto memory = pool.create_memory(shared("memory"), 4096, {.keep = seed % 11 == 0})) {
-      memory->object.bytes()[seed % 4096] = std::byte{1};
-    }
-    if (const auto mutex = pool.create_mutex(shared("mutex"))) {
-      const ObjectStatus locked = mutex->object.lock(soon());
-      const bool ours = locked == ObjectStatus::done || locked == ObjectStatus::owner_died;
-      if (ours && seed % 3 != 0) (void)mutex->object.unlock();
-    }
-    if (const auto semaphore = pool.create_semaphore(shared("semaphore"), 1)) {
-      if (semaphore->object.wait(soon()) == ObjectStatus::done) (void)semaphore->object.post();
-    }
-    if (const auto event = pool.create_shared_event(shared("event"))) {
-      std::uint64_t cursor = event->object.count();
-      (void)event->object.post();
-      (void)event->object.wait(cursor, soon());
-    }
-    (void)pool.remove_object(shared("memory"));
-    if (seed % 13 == 0) (void)pool.list();
-  }
-}
-
 TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   const auto common = pool_.create_mutex("mutex0", {.keep = true});
   ASSERT_TRUE(common);
@@ -328,23 +301,8 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
     for (const pid_t child : children) kill_and_reap(child);
     const std::uint64_t before = std::exchange(departed, view.header().departed.load());
     if (departed == before) slower = std::min(slower + 1, kSlowest);
-    // Nothing is held by the dead, and each kept memory has its file and no other one has.
-    std::size_t memories = 0;
-    for (const auto all = pool_.list().value(); const ObjectInfo& info : all) {
-      const bool ours = info.name == "mutex0";
-      ASSERT_TRUE(info.kept || ours) << info.name;
-      ASSERT_EQ(info.references.size(), ours ? 1U : 0U) << info.name;
-      ASSERT_EQ(info.waiters, 0U) << info.name;
-      if (info.type != ObjectType::memory) continue;
-      ++memories;
-      ASSERT_TRUE(pool_.open_memory(info.name)) << info.name;
-    }
-    ASSERT_EQ(damage_of(view), "");
-    std::size_t files = 0;
-    for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
-      if (file.path().filename().string().starts_with(name_.get() + ".memory.")) ++files;
-    }
-    ASSERT_EQ(files, memories);
+    expect_whole_after_a_storm(name_.get(), pool_, view);
+    if (HasFatalFailure()) return;
     const ObjectStatus locked = common->object.lock(MonotonicClock::now() + std::chrono::seconds(20));
     ASSERT_TRUE(locked == ObjectStatus::done || locked == ObjectStatus::owner_died);
     ASSERT_EQ(common->object.unlock(), ObjectStatus::done);

@@ -35,8 +35,10 @@ class EachInstruction : public testing::Test {
   void SetUp() override {
     if (kSanitized) GTEST_SKIP() << "too many instructions";
   }
-  EachInstruction()
-      : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kPlaces}).value())),
+  explicit EachInstruction(bool across_containers = false)
+      : pool_(std::move(
+            ObjectPool::create(name_.get(), {.max_objects = kPlaces, .across_containers = across_containers})
+                .value())),
         memory_(std::move(MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write).value())) {}
 
   /// Where the pool's file is mapped in this process.
@@ -207,6 +209,28 @@ TEST_F(EachInstruction, OfMakingAnEventInThePlaceOfOneThatNobodyNeeds) {
   for (std::uint32_t i = 0; i < kPlaces; ++i) ASSERT_TRUE(pool_.create_event("event" + std::to_string(i)));
   campaign([](ObjectPool&) {},
            [made = 0](ObjectPool& pool) mutable { (void)pool.create_event("new" + std::to_string(made++)); });
+}
+
+/// The same in a pool whose users know each other by locks alone.
+class EachInstructionAcrossContainers : public EachInstruction {
+ protected:
+  EachInstructionAcrossContainers() : EachInstruction(true) {}
+};
+
+TEST_F(EachInstructionAcrossContainers, OfMakingAKeptMemoryAndRemovingIt) {
+  campaign([](ObjectPool& pool) { (void)pool.create_semaphore("b", 1); },
+           [](ObjectPool& pool) {
+             (void)pool.create_memory("kept", 100, {.keep = true});
+             (void)pool.remove_object("kept");
+           });
+}
+
+TEST_F(EachInstructionAcrossContainers, OfMakingOpeningAndClosingASemaphore) {
+  campaign([](ObjectPool& pool) { static const auto held = pool.create_semaphore("a", 1); },
+           [](ObjectPool& pool) {
+             (void)pool.create_semaphore("b", 1);
+             (void)pool.open_semaphore("a");
+           });
 }
 
 }  // namespace

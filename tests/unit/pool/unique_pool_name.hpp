@@ -3,8 +3,8 @@
 #include <atomic>
 #include <string>
 
-#include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/pool/object_pool.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -14,7 +14,7 @@ class UniquePoolName {
  public:
   UniquePoolName() = default;
   ~UniquePoolName() {
-    MemoryFile::remove(name_);
+    ObjectPool::remove(name_);
     remove_pool_memories(name_);
   }
   UniquePoolName(const UniquePoolName&) = delete;
