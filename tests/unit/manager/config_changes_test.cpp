@@ -75,6 +75,7 @@ constexpr std::array kTwoValues = {
     TwoValues{"[host]", "application_versions", "5", "6"},
     TwoValues{"[host]", "pool", R"("a")", R"("b")"},
     TwoValues{"[host]", "pool_objects", "100", "200"},
+    TwoValues{"[host]", "pool_across_containers", "false", "true"},
     TwoValues{"[host]", "pool_owner", R"("0")", R"("1")"},
     TwoValues{"[host]", "pool_group", R"("0")", R"("1")"},
     TwoValues{"[host]", "pool_mode", R"("0660")", R"("0600")"},

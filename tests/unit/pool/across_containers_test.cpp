@@ -366,7 +366,7 @@ TEST_F(AcrossContainers, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   ASSERT_TRUE(common);
   const auto segment = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
   const PoolView view(segment->bytes(), kAcrossRoom);
-  constexpr unsigned kRounds = kSanitized ? 20 : 150;
+  constexpr unsigned kRounds = kSanitized ? 10 : 60;
   for (unsigned round = 0; round < kRounds; ++round) {
     std::vector<InAnotherNamespace> clients;
     for (unsigned i = 0; i < 3; ++i) {
