@@ -17,9 +17,9 @@ namespace plchost {
 /// Tells the users of a pool across containers that run from those that have ended, in every PID namespace.
 ///
 /// Each process has a number, and a lock on the byte of that number in the file POOL.clients (fcntl(2),
-/// F_SETLK). The kernel lets go of it at every end of the process and at exec(), and at no other time: a
-/// child of fork() does not have it, the end of a thread does not matter. Others ask the kernel whether the
-/// byte is locked. A number is never given twice.
+/// F_SETLK). The kernel lets go of it at every end of the process and at exec(), and at no other time. A
+/// child of fork() does not have it, and the end of a thread does not matter. Others ask the kernel whether
+/// the byte is locked. A number is never given twice.
 ///
 /// Any close() of the file lets go of all locks that the process has on it. So one descriptor serves all
 /// pools of that file in the process, it stays open when they go, and nothing else opens the file. A second

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-// The constants of a pool: what its header says from its making on. All functions are set-up.
+// The constants of a pool: its header has them from its making on. All functions are set-up.
 
 /// `version`: kPoolVersion or kPoolVersionAcross. `pid_namespace`: see PoolHeader.
 void write_pool_constants(PoolHeader& header, std::uint32_t version, std::uint32_t max_objects,

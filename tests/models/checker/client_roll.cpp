@@ -4,7 +4,7 @@
 
 namespace plchost::models {
 
-// Who sees that another one has ended knows all that it has done: the kernel has ended it.
+// A thread that sees the end of another one knows all that it has done: the kernel has ended it.
 bool KilledRoll::lives(std::uint32_t client) const noexcept {
   const Arena::Use off(false);
   Explorer& scene = *explorer();

@@ -35,7 +35,7 @@ using UseOfPool = std::function<void(ObjectPool&)>;
 
 constexpr std::uint32_t kAcrossRoom = 256;
 
-/// What processes tell each other here.
+/// The words that processes tell each other here.
 struct SharedSteps {
   std::atomic<std::uint32_t> step{0};
   std::atomic<std::uint64_t> a{0};
