@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
 
-// Who may write the pool may read and write the locks, nobody else may do either.
+// A user who may write the pool may read and write the locks, nobody else may do either.
 MemoryRights rights_of_locks(const MemoryRights& pool) noexcept {
   mode_t mode = S_IRUSR | S_IWUSR;
   if ((pool.mode & S_IWGRP) != 0) mode |= S_IRGRP | S_IWGRP;
