@@ -19,6 +19,7 @@
 #include "manager/host_check/host_check.hpp"
 #include "manager/pool_rights.hpp"
 #include "manager/retain_memories.hpp"
+#include "manager/store/exception_folder.hpp"
 #include "manager/store/store_process.hpp"
 #include "manager/supervisor/instance_files.hpp"
 #include "manager/system/child_process.hpp"
@@ -122,6 +123,10 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
       lock_(std::move(lock)),
       reactor_(std::move(reactor)),
       wish_writer_(*reactor_, "/proc/self/exe"),
+      exceptions_(wish_writer_, state_disk_,
+                  {.folder = exceptions_folder(config_.host.state_directory, config_.host.name),
+                   .run_directory = config_.host.run_directory}),
+      exceptions_wait_(*reactor_, [this] { await_exceptions(); }),
       api_server_(*reactor_, config_, options_.programs + "/plchost-dds",
                   [this] { return command_server_ && command_server_->waits_for_answers(); }),
       tick_(*reactor_, [this] { tick(); }) {}
@@ -206,6 +211,7 @@ Result<void> Manager::set_up() {
 
 Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
   const HostConfig& own = config_.host;
+  exceptions_.restore(instance.name);
   const std::string plc_instance = options_.programs + "/plc-instance";
   const TrialGroup trial_group(groups_, trial_group_name(own.pool, instance.name),
                                [this, name = instance.name] { return share_of(name).limits; });
@@ -342,7 +348,10 @@ void Manager::tick() {
   service_watchdog_.feed(MonotonicClock::now());
   supervisor_->refresh();
   if (latency_due_) restore_latency();
-  if (++ticks_ % kTicksPerTidying == 0) look_after_pool();
+  if (++ticks_ % kTicksPerTidying == 0) {
+    look_after_pool();
+    keep_exceptions();
+  }
   tick_.set(MonotonicClock::now() + kTick);
 }
 
@@ -398,7 +407,7 @@ void Manager::leave() {
   spdlog::info("ending for a restart: the instances run on");
   reload_->shut_down();
   notify_service_manager("STOPPING=1");
-  supervisor_->when_kept([this] { reactor_->stop(); });
+  when_kept([this] { reactor_->stop(); });
 }
 
 void Manager::shut_down() {
@@ -408,12 +417,34 @@ void Manager::shut_down() {
   // The API server last, so that it can still tell the world how the instances end.
   supervisor_->shut_down([this] {
     api_server_.shut_down([this] {
-      supervisor_->when_kept([this] {
+      when_kept([this] {
         clean_up();
         reactor_->stop();
       });
     });
   });
+}
+
+void Manager::keep_exceptions() {
+  for (std::size_t i = 0; i < supervisor_->size(); ++i)
+    exceptions_.look(supervisor_->instance(i).config().name, MonotonicClock::now());
+}
+
+// The end of this manager: all that the next one is to know is on the disk, or cannot be.
+void Manager::when_kept(std::function<void()> done) {
+  keep_exceptions();
+  all_kept_ = std::move(done);
+  supervisor_->when_kept([this] {
+    exceptions_limit_ = MonotonicClock::now() + kExceptionLimit;
+    await_exceptions();
+  });
+}
+
+void Manager::await_exceptions() {
+  constexpr Duration kAgain = std::chrono::milliseconds(5);
+  const TimePoint now = MonotonicClock::now();
+  if (!exceptions_.is_writing() || now >= exceptions_limit_) return all_kept_();
+  exceptions_wait_.set(now + kAgain);
 }
 
 // Processes that were ended just now may still be there.

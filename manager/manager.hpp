@@ -17,6 +17,7 @@
 #include "manager/control/config_reload.hpp"
 #include "manager/host_check/host_check.hpp"
 #include "manager/host_check/host_check_handler.hpp"
+#include "manager/store/exception_keeper.hpp"
 #include "manager/store/wish_folder.hpp"
 #include "manager/store/wish_store.hpp"
 #include "manager/supervisor/instance_files.hpp"
@@ -89,6 +90,9 @@ class Manager : private InstanceObserver {
   void clean_up();
   void tick();
   void look_after_pool();
+  void keep_exceptions();
+  void when_kept(std::function<void()> done);
+  void await_exceptions();
   void restore_latency();
 
   ManagerConfig config_;
@@ -107,6 +111,10 @@ class Manager : private InstanceObserver {
   HostStatus host_status_;
   std::map<std::string, TransitionRing, std::less<>> transitions_;  // by instance
   WishWriter wish_writer_;
+  ExceptionKeeper exceptions_;
+  Reactor::Timer exceptions_wait_;
+  TimePoint exceptions_limit_;
+  std::function<void()> all_kept_;
   std::map<std::string, WishStore*> wishes_;  // by instance; the supervisor's
   std::vector<InstanceConfig> gone_;          // removed and ended; retain variables not yet saved
   std::unique_ptr<Supervisor> supervisor_;

@@ -12,6 +12,7 @@
 #include "api/control/application_versions.hpp"
 #include "manager/manager.hpp"
 #include "manager/server_files.hpp"
+#include "manager/store/exception_folder.hpp"
 #include "shm/files/memory_rights.hpp"
 #include "shm/files/own_folder.hpp"
 #include "shm/files/replace_file.hpp"
@@ -32,6 +33,7 @@ Result<void> Manager::check_state_folders() {
   const HostConfig& host = config_.host;
   const std::vector<std::string> folders{host.state_directory, wishes_folder(host.state_directory, host.name),
                                          applications_folder(host.state_directory, host.name),
+                                         exceptions_folder(host.state_directory, host.name),
                                          audit_folder(host)};
   const auto check = [folders]() -> Result<void> {
     for (const std::string& folder : folders) {

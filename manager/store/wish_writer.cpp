@@ -12,6 +12,7 @@
 #include <poll.h>
 #include <sys/epoll.h>
 
+#include "manager/store/exception_folder.hpp"
 #include "manager/store/wish_folder.hpp"
 #include "manager/system/take_packets.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -31,9 +32,9 @@ std::uint64_t number_of(std::string_view text) {
   return number;
 }
 
-// The first three parts, and the rest.
-std::array<std::string, 4> parts_of(std::string_view packet) {
-  std::array<std::string, 4> parts;
+// The first four parts, and the rest.
+std::array<std::string, 5> parts_of(std::string_view packet) {
+  std::array<std::string, 5> parts;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::size_t end = i + 1 < parts.size() ? packet.find(kBetween) : std::string_view::npos;
     parts[i] = packet.substr(0, end);
@@ -49,6 +50,7 @@ Result<std::string> read_events(const std::string& path) {
 }
 
 Result<void> carry_out_order(const WishOrder& order) {
+  if (order.kind == WishOrder::Kind::exceptions) return keep_exceptions_on_disk(order.path, order.from);
   const std::filesystem::path path(order.path);
   if (auto made = make_wish_folder(path.parent_path()); !made) return made;
   std::error_code error;
@@ -72,8 +74,9 @@ Result<void> WishWriter::write(const WishOrder& order, Done done) {
     if (auto started = start(); !started) return started;
   }
   const std::uint64_t number = ++last_number_;
-  if (auto sent = link_.send(fmt::format("{}{}{}{}{}{}{}", number, kBetween, order.path, kBetween, order.from,
-                                         kBetween, order.text));
+  if (auto sent =
+          link_.send(fmt::format("{}{}{}{}{}{}{}{}{}", number, kBetween, std::to_underlying(order.kind),
+                                 kBetween, order.path, kBetween, order.from, kBetween, order.text));
       !sent) {
     return sent;
   }
@@ -132,8 +135,9 @@ int wish_writer_main() {
     const auto packet = link.receive();
     if (!packet) return 0;
     if (!*packet) continue;
-    const auto [number, path, from, text] = parts_of(**packet);
-    const auto done = carry_out_order({.path = path, .text = text, .from = from});
+    const auto [number, kind, path, from, text] = parts_of(**packet);
+    const auto done = carry_out_order(
+        {.kind = static_cast<WishOrder::Kind>(number_of(kind)), .path = path, .text = text, .from = from});
     constexpr std::size_t kMost = 1000;
     if (!link.send(done ? number : fmt::format("{} {}", number, done.error().describe().substr(0, kMost)))) {
       return 0;

@@ -16,6 +16,11 @@ namespace plchost {
 
 /// One file to be written as a whole, for good.
 struct WishOrder {
+  enum class Kind : std::uint8_t {
+    whole,       ///< see text and from
+    exceptions,  ///< those in `from` are added to those in `path`: see keep_exceptions_on_disk()
+  };
+  Kind kind = Kind::whole;
   std::string path;  ///< its folder is made if it is missing
   std::string text;  ///< the wanted contents
   std::string from;  ///< not empty: it is to be a copy of this file instead, and is removed if there is none

@@ -20,7 +20,13 @@ std::vector<ExceptionEntry> faults_of(const InstancePageReader& page) {
   for (std::uint32_t i = 0; i < page.task_count(); ++i) {
     const auto fault = page.fault(i);
     const auto task = fault ? page.task(i) : std::nullopt;
-    if (task) found.push_back(exception_entry(*fault, application, task->identity.name.view()));
+    if (!task) continue;
+    const TaskIdentity& identity = task->identity;
+    ExceptionEntry& entry = found.emplace_back(exception_entry(*fault, application, identity.name.view()));
+    entry.cycles = task->counters.cycles;
+    entry.settings = task_settings(identity.kind, Duration(identity.interval_ns), identity.iec_priority,
+                                   runtime ? runtime->core : -1);
+    if (runtime) entry.scheduler = runtime->scheduler.view();
   }
   std::ranges::sort(found, {}, &ExceptionEntry::unix_ns);
   return found;

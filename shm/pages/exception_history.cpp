@@ -36,7 +36,13 @@ Json to_json(const ExceptionEntry& entry) {
           {"memory_address", entry.memory_address},
           {"text", entry.text},
           {"back_trace", entry.back_trace},
-          {"back_trace_end", entry.back_trace_end}};
+          {"back_trace_end", entry.back_trace_end},
+          {"version", entry.version},
+          {"build", entry.build},
+          {"scheduler", entry.scheduler},
+          {"settings", entry.settings},
+          {"cycles", entry.cycles},
+          {"uptime_ns", entry.uptime_ns}};
 }
 
 // value() throws if a key is there with another type; the caller catches.
@@ -53,7 +59,13 @@ ExceptionEntry from_json(const Json& json) {
           .memory_address = json.value("memory_address", std::uint64_t{0}),
           .text = json.value("text", std::string()),
           .back_trace = json.value("back_trace", std::vector<std::string>()),
-          .back_trace_end = json.value("back_trace_end", std::string())};
+          .back_trace_end = json.value("back_trace_end", std::string()),
+          .version = json.value("version", std::string()),
+          .build = json.value("build", std::string()),
+          .scheduler = json.value("scheduler", std::string()),
+          .settings = json.value("settings", std::string()),
+          .cycles = json.value("cycles", std::uint64_t{0}),
+          .uptime_ns = json.value("uptime_ns", std::int64_t{0})};
 }
 
 std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
@@ -124,6 +136,21 @@ void ExceptionHistory::add(ExceptionEntry entry) {
   if (entries.size() > kMaxEntries) entries.erase(entries.begin());
 }
 
+// One that was there may take the room of a known one, which would seem new then: so first those that are
+// known.
+void ExceptionHistory::take(const ExceptionHistory& other) {
+  const ExceptionHistory before = *this;
+  for (const ExceptionEntry& entry : other.entries) {
+    if (holds(before, entry)) add(entry);
+  }
+  for (const ExceptionEntry& entry : other.entries) {
+    if (holds(before, entry) || was_dropped(before, entry)) continue;
+    if (entry.number > count) count = entry.number - 1;
+    add(entry);
+  }
+  count = std::max(count, other.count);
+}
+
 ExceptionEntry exception_entry(const FaultRecord& record, std::string_view application,
                                std::string_view task) {
   // Other signals give the address of the instruction once more.
@@ -141,7 +168,24 @@ ExceptionEntry exception_entry(const FaultRecord& record, std::string_view appli
           .memory_address = of_memory ? record.memory_address : 0,
           .text = describe_fault(record),
           .back_trace = {},
-          .back_trace_end = stopped ? std::string(kUntold) : describe_end(BackTrace{})};
+          .back_trace_end = stopped ? std::string(kUntold) : describe_end(BackTrace{}),
+          .version = {},
+          .build = {},
+          .scheduler = {},
+          .settings = {},
+          .cycles = 0,
+          .uptime_ns = 0};
+}
+
+std::string task_settings(TaskKind kind, Duration interval, int priority, int core) {
+  const TaskKindTraits* const traits = find_traits(kind);
+  std::string text = fmt::format("{}", traits != nullptr ? traits->name : "of an unknown kind");
+  if (interval > Duration::zero()) {
+    constexpr double kNsPerMs = 1e6;
+    text += fmt::format(", interval {:g} ms", static_cast<double>(interval.count()) / kNsPerMs);
+  }
+  text += fmt::format(", priority {}", priority);
+  return text + (core >= 0 ? fmt::format(", core {}", core) : std::string(", several cores"));
 }
 
 std::string exception_path(std::string_view run_directory, std::string_view instance) {
@@ -168,8 +212,8 @@ Result<ExceptionHistory> read_exceptions(const std::string& path) {
   }
 }
 
-Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history) {
-  return replace_file(path, bounded_text(history));
+Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history, mode_t mode) {
+  return replace_file(path, bounded_text(history), mode);
 }
 
 Result<std::string> keep_exceptions(const std::string& path, std::span<const ExceptionEntry> found) {
@@ -180,13 +224,7 @@ Result<std::string> keep_exceptions(const std::string& path, std::span<const Exc
     history = ExceptionHistory{};
   }
   const ExceptionHistory before = *history;
-  // Each against the file as it was: a new one may take the room of a known one, which would seem new then.
-  for (const ExceptionEntry& entry : found) {
-    if (holds(before, entry)) history->add(entry);
-  }
-  for (const ExceptionEntry& entry : found) {
-    if (!holds(before, entry) && !was_dropped(before, entry)) history->add(entry);
-  }
+  history->take({.count = 0, .entries = {found.begin(), found.end()}});
   if (*history == before) return remark;
   PLCHOST_TRY(write_exceptions(path, *history));
   return remark;

@@ -50,6 +50,13 @@ void read_history(const std::string& text) {
   if (!write_exceptions(kPath, *history)) std::abort();
   const auto again = read_exceptions(kPath);
   if (!again || again->count != history->count || again->entries != history->entries) std::abort();
+  // As the disk takes what an instance has written, and again.
+  ExceptionHistory kept;
+  kept.take(*history);
+  if (kept.entries.size() > history->entries.size()) std::abort();
+  const ExceptionHistory once = kept;
+  kept.take(*history);
+  if (kept.entries.size() > ExceptionHistory::kMaxEntries || kept.count < once.count) std::abort();
 }
 
 }  // namespace

@@ -1,10 +1,12 @@
-// The audit log on a disk that refuses what it had taken. The recorder is linked, and lets the disk do so.
+// Audit log and exceptions on a disk that refuses what it had taken. The recorder is linked, and lets the
+// disk do so.
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -17,6 +19,8 @@
 
 #include "api/audit/audit_check.hpp"
 #include "api/audit/audit_log.hpp"
+#include "manager/store/exception_folder.hpp"
+#include "shm/pages/exception_history.hpp"
 #include "tests/integration/storage/stop_record.hpp"
 #include "tests/support/own_name.hpp"
 
@@ -24,22 +28,31 @@ namespace plchost {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class LogOnABadDisk : public testing::Test {
+class OnABadDisk : public testing::Test {
  protected:
-  LogOnABadDisk() {
+  OnABadDisk() {
     fs::create_directories(top_);
     ::setenv("RECORDED_FOLDER", top_.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
     ::setenv("DISK_FAULT", fault_.c_str(), 1);     // NOLINT(concurrency-mt-unsafe)
   }
-  ~LogOnABadDisk() override {
+  ~OnABadDisk() override {
     ::unsetenv("DISK_FAULT");       // NOLINT(concurrency-mt-unsafe)
     ::unsetenv("RECORDED_FOLDER");  // NOLINT(concurrency-mt-unsafe)
     fs::remove_all(root_);
   }
+
+  const fs::path root_ = own_path("bad_disk");
+  const fs::path fault_ = root_ / "fault";
+  const fs::path top_ = root_ / "disk";
+};
+
+class LogOnABadDisk : public OnABadDisk {
+ protected:
   [[nodiscard]] std::unique_ptr<AuditLog> open() const {
     auto log = AuditLog::open({.folder = folder_});
     EXPECT_TRUE(log) << log.error().describe();
@@ -74,9 +87,6 @@ class LogOnABadDisk : public testing::Test {
     return checked->remarks;
   }
 
-  const fs::path root_ = own_path("bad_disk");
-  const fs::path fault_ = root_ / "fault";
-  const fs::path top_ = root_ / "disk";
   const std::string folder_ = top_ / "audit.cell";
 };
 
@@ -118,6 +128,50 @@ TEST_F(LogOnABadDisk, WritesNothingIntoAnotherFileOfItsName) {
   mend(*log);
   std::ifstream stream(file);
   EXPECT_EQ((std::string{std::istreambuf_iterator<char>(stream), {}}), "of another program");
+}
+
+TEST_F(OnABadDisk, ExceptionsAreRefusedWithTheDisksErrorAndKeptWhenItIsWell) {
+  const std::string written = root_ / "line1.exception";  // of the run directory
+  const std::string file = kept_exceptions_path(exceptions_folder(top_.string(), "cell"), "line1");
+  const auto raise = [&](const char* task) {
+    ExceptionEntry entry;
+    entry.unix_ns = 1;
+    entry.task = task;
+    ASSERT_TRUE(keep_exceptions(written, std::span(&entry, 1)));
+  };
+  raise("First");
+  ASSERT_TRUE(keep_exceptions_on_disk(file, written));
+  raise("Second");
+  for (const char* const fault : {"full", "read-only"}) {
+    std::ofstream(fault_) << fault;
+    const auto refused = keep_exceptions_on_disk(file, written);
+    ASSERT_FALSE(refused) << fault;
+    EXPECT_THAT(refused.error().describe(),
+                AnyOf(HasSubstr("No space left on device"), HasSubstr("Read-only file system")));
+    EXPECT_EQ(read_exceptions(file)->entries.size(), 1U);
+    fs::remove(fault_);
+  }
+  ASSERT_TRUE(keep_exceptions_on_disk(file, written));
+  EXPECT_EQ(read_exceptions(file)->entries.back().task, "Second");
+}
+
+// Those of instances that the configuration does not have any more stay as long as there is room.
+TEST_F(OnABadDisk, ExceptionsOfTheInstancesThatWereWrittenLastStay) {
+  const std::string written = root_ / "line1.exception";
+  const std::string folder = exceptions_folder(top_.string(), "cell");
+  ExceptionEntry entry;
+  entry.unix_ns = 1;
+  entry.task = "Fill";
+  ASSERT_TRUE(keep_exceptions(written, std::span(&entry, 1)));
+  for (std::size_t i = 0; i <= kMostExceptionFiles; ++i) {
+    const std::string file = kept_exceptions_path(folder, "line" + std::to_string(i));
+    ASSERT_TRUE(keep_exceptions_on_disk(file, written));
+    if (i == 0) fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}),
+            static_cast<std::ptrdiff_t>(kMostExceptionFiles));
+  EXPECT_FALSE(fs::exists(kept_exceptions_path(folder, "line0")));
+  EXPECT_TRUE(fs::exists(kept_exceptions_path(folder, "line1")));
 }
 
 }  // namespace

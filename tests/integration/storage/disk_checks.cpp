@@ -16,6 +16,7 @@
 #include "api/security/sha256.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
 #include "manager/store/instance_wish.hpp"
+#include "shm/pages/exception_history.hpp"
 
 namespace plchost {
 
@@ -26,6 +27,7 @@ namespace fs = std::filesystem;
 enum class Rule : std::uint8_t {
   whole,   // old or new contents, and the newest that were promised
   wish,    // and decode_wish() takes it
+  faults,  // and read_exceptions() takes it
   retain,  // and RetainFiles::look() finds its values
   log,     // records that were promised; it goes on behind them
   left,    // by a process that was killed; the next one removes or replaces it
@@ -35,11 +37,11 @@ enum class Rule : std::uint8_t {
 Rule rule_of(const std::string& path) {
   constexpr std::array kRules{std::pair{".new", Rule::left},        std::pair{".part", Rule::left},
                               std::pair{".lock", Rule::left},       std::pair{".wish", Rule::wish},
-                              std::pair{".events", Rule::whole},    std::pair{"/boot", Rule::whole},
-                              std::pair{".so", Rule::whole},        std::pair{".json", Rule::whole},
-                              std::pair{".retain.0", Rule::retain}, std::pair{".retain.1", Rule::retain},
-                              std::pair{".old", Rule::whole},       std::pair{".log", Rule::log},
-                              std::pair{".plain", Rule::whole}};
+                              std::pair{".events", Rule::whole},    std::pair{".exceptions", Rule::faults},
+                              std::pair{"/boot", Rule::whole},      std::pair{".so", Rule::whole},
+                              std::pair{".json", Rule::whole},      std::pair{".retain.0", Rule::retain},
+                              std::pair{".retain.1", Rule::retain}, std::pair{".old", Rule::whole},
+                              std::pair{".log", Rule::log},         std::pair{".plain", Rule::whole}};
   if (path.contains(DiskModel::kUnimportant)) return Rule::left;
   const auto rule =
       std::ranges::find_if(kRules, [&](const auto& each) { return path.ends_with(each.first); });
@@ -122,6 +124,7 @@ void DiskChecks::look_at_file(const CutDisk& disk, const std::string& path) {
   }
   if (!contents) return;
   if (rule == Rule::wish && !decode_wish(*contents)) wrong(disk, path, "it is no wish");
+  if (rule == Rule::faults && !read_exceptions(at(path))) wrong(disk, path, "it has no exceptions");
   if (rule == Rule::retain) look_at_retain(disk, path);
 }
 

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,9 +19,11 @@
 #include "api/control/application_versions.hpp"
 #include "api/security/sha256.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
+#include "manager/store/exception_folder.hpp"
 #include "manager/store/store_application.hpp"
 #include "manager/store/wish_folder.hpp"
 #include "shm/files/replace_file.hpp"
+#include "shm/pages/exception_history.hpp"
 #include "tests/integration/storage/recorded_folder.hpp"
 #include "tests/integration/storage/stop_record.hpp"
 
@@ -196,6 +199,24 @@ TEST_F(LogUnderPowerCuts, WritesRecordsAgainThatTheDiskHasNotSynced) {
   EXPECT_TRUE(std::any_of(place("mended"), place("told"), [&](const Change& change) {
     return change.kind == ChangeKind::write && change.other.contains(last);
   })) << "before the problem has ended";
+}
+
+TEST_F(WritersUnderPowerCuts, KeepExceptions) {
+  const std::string written = own_path("line1.exception");  // in the run directory, which is memory
+  const std::string file = kept_exceptions_path(exceptions_folder(path("state"), "cell"), "line1");
+  for (int round = 0; round < 4; ++round) {
+    ExceptionEntry entry;
+    entry.unix_ns = round + 1;
+    entry.task = fmt::format("Task{}", round);
+    entry.text = std::string(3000, 'x');
+    ASSERT_TRUE(keep_exceptions(written, std::span(&entry, 1)));
+    const auto kept = keep_exceptions_on_disk(file, written);
+    ASSERT_TRUE(kept) << kept.error().describe();
+    mark("kept all");
+  }
+  fs::remove(written);
+  EXPECT_EQ(read_exceptions(file)->entries.size(), 4U);
+  expect_no_problem();
 }
 
 TEST_F(WritersUnderPowerCuts, MakeTheFolderOfWishesAndAllAboveIt) {

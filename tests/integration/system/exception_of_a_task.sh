@@ -52,3 +52,17 @@ is "$(plcctl list exceptions --json | jq -r 'map(.instance) | join(",")')" line1
 kill -TERM "${managers[1]}"
 wait "${managers[1]}" || fail "the manager ended with $?"
 nothing_left
+
+echo "- and after a power cut, which empties the run directory"
+rm -rf "$cell/cell"
+start_manager cell
+until_true 20 state_is line1 running
+has line1 count "$faults" && has line1 task Divide && has line1 present false || fail "$(plcctl show exception line1)"
+exception line1 symbol | grep -qF 'divide()+0x' || fail "$(plcctl show exception line1)"
+plcctl post event line1/divide >/dev/null
+faults=$((faults + 1))
+until_true 20 has line1 count "$faults"
+kill -TERM "${managers[2]}"
+wait "${managers[2]}" || fail "the manager ended with $?"
+is "$(jq -r '.count' "$cell/cell.state/exceptions.cell/line1.exceptions")" "$faults" || fail "the disk has not the newest one"
+nothing_left

@@ -26,6 +26,12 @@ class ExceptionHistoryTest : public testing::Test {
     made.text = std::move(text);
     made.back_trace = {"fill(int)+0x12 in line.so", "0x7f12"};
     made.back_trace_end = "only a part is known";
+    made.version = "0.1.0";
+    made.build = "GCC 12, build ID 4f";
+    made.scheduler = "CmpSchedule";
+    made.settings = "cyclic, interval 10 ms, priority 4, core 1";
+    made.cycles = 5;
+    made.uptime_ns = 7;
     return made;
   }
 
@@ -45,6 +51,52 @@ TEST_F(ExceptionHistoryTest, ComesBackFromTheFileAsItWasWritten) {
   EXPECT_EQ(back->entries[0].task, "Fill");
   EXPECT_EQ(back->entries[0].back_trace, sut.entries[0].back_trace);
   EXPECT_EQ(back->entries[0].back_trace_end, "only a part is known");
+}
+
+TEST_F(ExceptionHistoryTest, KeepsTheCircumstances) {
+  ExceptionHistory sut;
+  sut.add(entry("first"));
+  ASSERT_TRUE(write_exceptions(path_, sut));
+  EXPECT_EQ(read_exceptions(path_), sut);
+}
+
+TEST_F(ExceptionHistoryTest, OfAVersionBeforeHasNoCircumstances) {
+  write(R"({"version": 1, "count": 1, "exceptions": [{"number": 1, "task": "Fill", "kind": "signal"}]})");
+  const auto back = read_exceptions(path_);
+  ASSERT_TRUE(back) << back.error().describe();
+  EXPECT_EQ(back->entries[0].task, "Fill");
+  EXPECT_EQ(back->entries[0].settings, "");
+}
+
+TEST_F(ExceptionHistoryTest, TakesWhatAnotherHasInTheOrderAndWithTheNumbersOfThat) {
+  const auto made = [](int time) {
+    ExceptionEntry entry = ExceptionHistoryTest::entry("at " + std::to_string(time));
+    entry.unix_ns = time;
+    return entry;
+  };
+  ExceptionHistory other;
+  for (int time = 1; time <= 20; ++time) other.add(made(time));
+  ExceptionHistory sut;
+  sut.take(other);
+  EXPECT_EQ(sut, other) << "one that has nothing becomes the other";
+  other.add(made(21));
+  sut.take(other);
+  sut.take(other);
+  EXPECT_EQ(sut, other) << "a known one is not counted again";
+  ExceptionHistory anew;  // of an instance that did not find the one before
+  anew.add(made(22));
+  sut.take(anew);
+  EXPECT_EQ(sut.count, 22U);
+  EXPECT_EQ(sut.entries.back().number, 22U);
+  EXPECT_EQ(sut.entries.back().text, "at 22");
+  EXPECT_EQ(sut.entries.size(), ExceptionHistory::kMaxEntries);
+}
+
+TEST_F(ExceptionHistoryTest, TellsTheSettingsOfATaskInWords) {
+  EXPECT_EQ(task_settings(TaskKind::cyclic, std::chrono::microseconds(2500), 4, 1),
+            "cyclic, interval 2.5 ms, priority 4, core 1");
+  EXPECT_EQ(task_settings(TaskKind::external, Duration::zero(), 18, -1),
+            "external, priority 18, several cores");
 }
 
 TEST_F(ExceptionHistoryTest, SaysThatTheBackTraceOfAProcessThatEndedIsNotKnown) {
