@@ -132,6 +132,14 @@ const FaultTrap* FaultTrap::here() noexcept {
   return armed;
 }
 
+void FaultTrap::throw_leaves() noexcept {
+  if (armed != nullptr) StackWalk::walk_throw(armed->thrown_, armed->bottom_);
+}
+
+BackTrace FaultTrap::take_thrown() noexcept {
+  return armed != nullptr ? std::exchange(armed->thrown_, {}) : BackTrace{};
+}
+
 void FaultTrap::strike(TimePoint since, FaultKind kind, std::int64_t figure, std::int64_t limit) noexcept {
   struck_figure_.store(figure, std::memory_order_relaxed);
   struck_kind_.store(kind, std::memory_order_relaxed);

@@ -48,6 +48,12 @@ class FaultTrap {
   [[nodiscard]] static bool armed_here() noexcept { return here() != nullptr; }
   /// The one under which the calling thread runs code of a task; null: it runs none. Any context.
   [[nodiscard]] static const FaultTrap* here() noexcept;
+  /// For ThrowProbe: a C++ exception leaves the code that the calling thread runs, and the functions that
+  /// have thrown it are still on the stack. Nothing happens if it runs none. Real-time.
+  static void throw_leaves() noexcept;
+  /// The functions that throw_leaves() has found last, taken once: there are none then. Real-time; the trap's
+  /// own thread.
+  [[nodiscard]] static BackTrace take_thrown() noexcept;
   /// Since when the code runs that is running now. Any thread.
   [[nodiscard]] std::optional<TimePoint> running_since() const noexcept { return seat_.code_since(); }
   /// Where the thread says that it is in a cycle. Any thread.
@@ -75,6 +81,7 @@ class FaultTrap {
   std::atomic<pid_t> thread_{0};
   std::atomic<bool> parked_{false};
   bool event_variable_ = false;
+  BackTrace thrown_;
   std::uintptr_t bottom_ = 0;  // the stack pointer of the function that has called arm()
   // The order of strike(); written before the signal is sent.
   std::atomic<Duration::rep> struck_{0};

@@ -3,7 +3,9 @@
 #include <atomic>
 #include <csetjmp>
 #include <csignal>
+#include <exception>
 
+#include <cxxabi.h>
 #include <unwind.h>
 
 #include "schedulers/faults/fault_trap.hpp"
@@ -91,6 +93,27 @@ void walk_guarded(Walk& walk) noexcept {
   way_out = nullptr;
 }
 
+bool throws(_Unwind_Context* function) noexcept {
+  const std::uintptr_t begin = _Unwind_GetRegionStart(function);
+  const auto is = [begin](auto* address) { return reinterpret_cast<std::uintptr_t>(address) == begin; };
+  return is(&_Unwind_RaiseException) || is(&_Unwind_Resume_or_Rethrow) || is(&abi::__cxa_throw) ||
+         is(&abi::__cxa_rethrow) || is(&std::rethrow_exception);
+}
+
+// The search for the handler has just come the same way, so all that is read can be read. The
+// functions before are those of that search.
+_Unwind_Reason_Code on_thrower(_Unwind_Context* function, void* argument) {
+  Walk& walk = *static_cast<Walk*>(argument);
+  if (throws(function)) {
+    walk.trace->count = 0;
+    return _URC_NO_REASON;
+  }
+  if (_Unwind_GetCFA(function) >= walk.bottom) return end_with(walk, BackTrace::End::whole);
+  if (walk.trace->count == BackTrace::kMost) return end_with(walk, BackTrace::End::deep);
+  add(*walk.trace, _Unwind_GetIP(function));
+  return _URC_NO_REASON;
+}
+
 _Unwind_Reason_Code look_at_one(_Unwind_Context* function, void* found) {
   *static_cast<std::uintptr_t*>(found) = _Unwind_GetIP(function) + _Unwind_GetCFA(function);
   return _URC_NORMAL_STOP;
@@ -119,6 +142,13 @@ void StackWalk::walk(BackTrace& into, ucontext_t& context, std::uintptr_t bottom
   const auto registers = context.uc_mcontext;
   if (return_to(context, caller)) walk_guarded(walk);
   context.uc_mcontext = registers;
+}
+
+void StackWalk::walk_throw(BackTrace& into, std::uintptr_t bottom) noexcept {
+  into = {};
+  into.end = BackTrace::End::lost;
+  Walk walk{.trace = &into, .first = 0, .bottom = bottom};
+  _Unwind_Backtrace(on_thrower, &walk);
 }
 
 void StackWalk::interrupted() noexcept {

@@ -22,6 +22,10 @@ class StackWalk {
   static void walk(BackTrace& into, ucontext_t& context, std::uintptr_t bottom,
                    std::uintptr_t caller) noexcept;
 
+  /// Within the search for a handler of a C++ exception: the functions that led to where it was thrown, each
+  /// as the address that its call returns to. `bottom`: as above. Real-time.
+  static void walk_throw(BackTrace& into, std::uintptr_t bottom) noexcept;
+
   /// For the handler of SIGSEGV and SIGBUS, first of all: if the fault is one of a walk of this thread, ends
   /// the walk and does not return. Signal context.
   static void interrupted() noexcept;

@@ -5,6 +5,8 @@
 
 #include <cxxabi.h>
 
+#include "schedulers/faults/fault_trap.hpp"
+
 namespace plchost {
 
 namespace {
@@ -30,8 +32,11 @@ FixedText<FaultRecord::kMaxText> type_of_exception() noexcept {
 void raise_current_exception(TaskFault& fault, bool event_variable) noexcept {
   const auto what = what_of_exception();
   const auto type = type_of_exception();
+  const BackTrace thrown = FaultTrap::take_thrown();
   if (!fault.claim(event_variable)) return;
+  fault.back_trace() = thrown;
   FaultRecord& record = fault.record();
+  record.address = thrown.count > 0 ? thrown.addresses[0] : 0;
   record.kind = FaultKind::cpp_exception;
   record.in_event_variable = event_variable;
   record.text = what;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "schedulers/faults/throw_probe.hpp"
 #include "schedulers/tasks/event_latch.hpp"
 
 namespace plchost {
@@ -63,6 +64,7 @@ bool Task::run_entry() noexcept {
   try {
     config_.entry();
     return true;
+  } catch (const ThrowProbe&) {  // never: it only looks at the stack
   } catch (...) {
     raise_current_exception(fault_);
   }

@@ -42,7 +42,7 @@ struct BackTrace {
     lost,     ///< the caller of the last one is not known
     damaged,  ///< the stack leads to memory that cannot be read
   };
-  std::array<std::uint64_t, kMost> addresses{};  ///< of the instruction, then those that calls return to
+  std::array<std::uint64_t, kMost> addresses{};  ///< of the instruction or throw, then of calls: behind each
   std::uint8_t count = 0;
   End end = End::none;
 };
@@ -61,7 +61,7 @@ struct FaultRecord {
   std::uint8_t not_caught = 0;         ///< a watchdog struck its thread, and it ran on
   std::int32_t signal = 0;             ///< 0 if it was none
   std::int32_t signal_code = 0;        ///< si_code
-  std::uint64_t address = 0;           ///< of the instruction; 0 if not known
+  std::uint64_t address = 0;           ///< of the instruction, or behind a throw; 0 if not known
   std::uint64_t caller = 0;  ///< the origin of a jump to `address` if no code is there; 0 if not known
   std::uint64_t memory_address = 0;      ///< the address of SIGSEGV and SIGBUS
   std::int64_t figure = 0;               ///< the watchdog's measure: ns, cycles or percent, by kind

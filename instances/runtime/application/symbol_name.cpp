@@ -3,70 +3,33 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <cxxabi.h>
 #include <dlfcn.h>
-#include <elf.h>
 #include <fmt/format.h>
 
-#include "instances/runtime/application/elf_bytes.hpp"
+#include "instances/runtime/application/debug_lines.hpp"
+#include "instances/runtime/application/elf_file.hpp"
+#include "instances/runtime/application/elf_functions.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
 
-/// The function that an address lies in.
-struct Function {
-  std::string name;
-  std::uint64_t offset = 0;
-};
-
 std::string demangled(const char* name) {
   int status = 0;
   const std::unique_ptr<char, decltype(&std::free)> readable(
       abi::__cxa_demangle(name, nullptr, nullptr, &status), &std::free);
   return readable ? std::string(readable.get()) : std::string(name);
-}
-
-std::optional<Function> function_in(ElfBytes symbols, ElfBytes names, std::uint64_t address) {
-  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(symbols, i); ++i) {
-    const bool function = ELF64_ST_TYPE(symbol->st_info) == STT_FUNC && symbol->st_shndx != SHN_UNDEF;
-    if (!function || address < symbol->st_value || address - symbol->st_value >= symbol->st_size) continue;
-    if (symbol->st_name >= names.size()) break;
-    const ElfBytes rest = names.subspan(symbol->st_name);
-    const auto* const name = reinterpret_cast<const char*>(rest.data());
-    return Function{.name = demangled(std::string(name, ::strnlen(name, rest.size())).c_str()),
-                    .offset = address - symbol->st_value};
-  }
-  return std::nullopt;
-}
-
-// The full symbol table, which the dynamic loader does not read: it knows the program's own functions, too.
-std::optional<Function> function_at(ElfBytes file, std::uint64_t address) {
-  const auto header = elf_item<Elf64_Ehdr>(file, 0);
-  if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 ||
-      header->e_ident[EI_CLASS] != ELFCLASS64)
-    return std::nullopt;
-  const auto sections = elf_slice(file, header->e_shoff, std::uint64_t{header->e_shnum} * sizeof(Elf64_Shdr));
-  if (!sections) return std::nullopt;
-  for (std::uint64_t i = 0; const auto section = elf_item<Elf64_Shdr>(*sections, i); ++i) {
-    if (section->sh_type != SHT_SYMTAB) continue;
-    const auto symbols = elf_slice(file, section->sh_offset, section->sh_size);
-    const auto texts = elf_item<Elf64_Shdr>(*sections, section->sh_link);
-    const auto names = texts ? elf_slice(file, texts->sh_offset, texts->sh_size) : std::nullopt;
-    if (symbols && names) return function_in(*symbols, *names, address);
-  }
-  return std::nullopt;
 }
 
 // How people call it. A copy in memory has the name of the file that was copied.
@@ -82,40 +45,88 @@ std::string file_name(const char* path) {
   return name;
 }
 
-}  // namespace
+/// A place in the code, and the file that it lies in.
+struct Mapped {
+  std::string path;  // as the loader has it; empty: none is mapped there
+  std::uint64_t behind = 0;
+  std::uint64_t looked_at = 0;  // as the file counts addresses
+  std::string exported;         // the function as the loader knows it, with its offset; empty: it knows none
+};
 
-const std::vector<char>& SymbolNames::contents_of(const char* path) {
-  const auto known = files_.find(std::string_view(path));
-  if (known != files_.end()) return known->second;
-  // As a whole: byte by byte a large file would keep the control thread for seconds.
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  std::vector<char> contents(error ? 0 : size);
-  std::ifstream file(path, std::ios::binary);
-  file.read(contents.data(), std::ssize(contents));
-  contents.resize(static_cast<std::size_t>(file.gcount()));
-  return files_.emplace(path, std::move(contents)).first->second;
-}
-
-std::string SymbolNames::at(std::uintptr_t address, bool returned_to) {
-  const std::uintptr_t looked_at = returned_to && address != 0 ? address - 1 : address;
+// A call returns to what may be the next function, so that is looked for before.
+Mapped mapped_at(const CodePlace& place) {
+  const std::uintptr_t looked_at =
+      place.returned_to && place.address != 0 ? place.address - 1 : place.address;
   Dl_info info{};
   // NOLINTNEXTLINE(performance-no-int-to-ptr): it is an address
   if (looked_at == 0 || ::dladdr(reinterpret_cast<const void*>(looked_at), &info) == 0 ||
       info.dli_fname == nullptr)
     return {};
-  const std::string file = file_name(info.dli_fname);
-  const auto base = reinterpret_cast<std::uintptr_t>(info.dli_fbase);
-  const std::uintptr_t behind = address - looked_at;
-  if (const auto function =
-          function_at(std::as_bytes(std::span(contents_of(info.dli_fname))), looked_at - base)) {
-    return printable(fmt::format("{}+{:#x} in {}", function->name, function->offset + behind, file));
-  }
+  Mapped mapped{.path = info.dli_fname,
+                .behind = place.address - looked_at,
+                .looked_at = looked_at - reinterpret_cast<std::uintptr_t>(info.dli_fbase),
+                .exported = {}};
   if (info.dli_sname != nullptr) {
-    const auto offset = address - reinterpret_cast<std::uintptr_t>(info.dli_saddr);
-    return printable(fmt::format("{}+{:#x} in {}", demangled(info.dli_sname), offset, file));
+    const auto offset = place.address - reinterpret_cast<std::uintptr_t>(info.dli_saddr);
+    mapped.exported = fmt::format("{}+{:#x}", demangled(info.dli_sname), offset);
   }
-  return printable(fmt::format("{}+{:#x}", file, address - base));
+  return mapped;
+}
+
+std::string name_in(const std::string& file, const Mapped& place, const std::optional<ElfFunction>& function,
+                    const SourceLine& line) {
+  std::string name;
+  if (function) {
+    name = fmt::format("{}+{:#x} in {}", demangled(function->name.c_str()), function->offset + place.behind,
+                       file);
+  } else if (!place.exported.empty()) {
+    name = fmt::format("{} in {}", place.exported, file);
+  } else {
+    name = fmt::format("{}+{:#x}", file, place.looked_at + place.behind);
+  }
+  if (line.line != 0 && !line.file.empty()) name += fmt::format(" at {}:{}", line.file, line.line);
+  return printable(std::move(name));
+}
+
+// Of the places in one file, each with its number among all.
+std::vector<std::pair<std::size_t, std::string>> names_in(const std::string& path,
+                                                          std::span<const Mapped> mapped,
+                                                          std::span<const std::size_t> of_file) {
+  std::vector<std::uint64_t> addresses;
+  for (const std::size_t place : of_file) addresses.push_back(mapped[place].looked_at);
+  std::vector<std::optional<ElfFunction>> functions(of_file.size());
+  std::vector<SourceLine> lines(of_file.size());
+  if (const auto file = ElfFile::open(path)) {
+    functions = functions_at(*file, addresses);
+    lines = source_lines(*file, addresses);
+  }
+  std::vector<std::pair<std::size_t, std::string>> names;
+  const std::string shown_file = file_name(path.c_str());
+  for (std::size_t i = 0; i < of_file.size(); ++i) {
+    names.emplace_back(of_file[i], name_in(shown_file, mapped[of_file[i]], functions[i], lines[i]));
+  }
+  return names;
+}
+
+}  // namespace
+
+std::vector<std::string> names_of(std::span<const CodePlace> places) {
+  std::vector<Mapped> mapped;
+  std::map<std::string, std::vector<std::size_t>> files;
+  for (const CodePlace& place : places) {
+    mapped.push_back(mapped_at(place));
+    if (!mapped.back().path.empty()) files[mapped.back().path].push_back(mapped.size() - 1);
+  }
+  std::vector<std::string> names(places.size());
+  for (const auto& [path, of_file] : files) {
+    for (auto& [place, name] : names_in(path, mapped, of_file)) names[place] = std::move(name);
+  }
+  return names;
+}
+
+std::string name_of(std::uintptr_t address) {
+  const CodePlace place{.address = address};
+  return names_of(std::span(&place, 1)).front();
 }
 
 std::string with_readable_symbols(std::string_view text) {

@@ -1,26 +1,29 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace plchost {
 
-/// Names places in the code of this process, and keeps the files that it has read for that.
-class SymbolNames {
- public:
-  /// Where an address lies: "fill(int)+0x12 in bottling.so", or "bottling.so+0x1190" if the file has no
-  /// symbol for it; empty: no file is mapped there. Looks into the file's table of symbols, too, so that
-  /// functions which it does not export have names. `returned_to`: a call returns to it, so its function is
-  /// that of the call before. Set-up.
-  [[nodiscard]] std::string at(std::uintptr_t address, bool returned_to = false);
-
- private:
-  const std::vector<char>& contents_of(const char* path);
-  std::map<std::string, std::vector<char>, std::less<>> files_;
+/// A place in the code of this process.
+struct CodePlace {
+  std::uintptr_t address = 0;
+  bool returned_to = false;  ///< a call returns to it, so its function and line are those of the call before
 };
+
+/// Where each place lies: "fill(int)+0x12 in bottling.so at bottling.cpp:41". Without the line, if the file
+/// has no debug information: see source_lines(). "bottling.so+0x1190" if it has no symbol for the place;
+/// empty: no file is mapped there. Looks into the file's table of symbols, too (up to 64 MiB of it), so that
+/// functions which it does not export have names. Set-up.
+///
+/// Each file is read once for all its places, and piece by piece. It is read here, in the process that runs
+/// its code: so the author of a file that misleads this reader gains nothing by it.
+[[nodiscard]] std::vector<std::string> names_of(std::span<const CodePlace> places);
+/// Of one place, which is no return address.
+[[nodiscard]] std::string name_of(std::uintptr_t address);
 
 /// `text` with the names of C++ functions in it as they are written in C++: "fill(int)" for "_Z4filli".
 /// Set-up.

@@ -30,6 +30,8 @@
 
 namespace plchost {
 
+struct ExceptionEntry;
+
 /// One PLC runtime: everything that a plc-instance process owns. All of it on the control thread; the tasks'
 /// threads are TaskSet's.
 class Instance {
@@ -190,12 +192,14 @@ class Instance {
   void report_clock(ClockRuntime& clock);
   void make_outputs_safe(const TaskSet::Fault& fault);
   [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
+  void add_circumstances(ExceptionEntry& entry, std::size_t index);
   [[nodiscard]] Result<void> restore_operator_events();
   void keep_settings();
   void notify_tasks(unsigned event);
   void look_after_page();
 
   Options options_;
+  TimePoint begun_ = MonotonicClock::now();  // the process, within milliseconds
   std::string scheduler_;
   TickReport tick_;  // as it was logged last
   std::vector<int> cores_;

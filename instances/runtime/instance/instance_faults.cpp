@@ -4,9 +4,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "instances/runtime/application/build_of.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
 #include "instances/runtime/instance/instance.hpp"
 #include "shm/base/names.hpp"
@@ -34,19 +36,39 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
   const FaultRecord& record = fault.record;
   ExceptionEntry entry = exception_entry(record, application, fault.name);
   entry.whole_application = fault.whole_application;
-  SymbolNames names;
-  entry.symbol = names.at(record.address);
+  const BackTrace& trace = fault.back_trace;
+  const bool thrown = record.kind == FaultKind::cpp_exception;
+  std::vector<CodePlace> places{{.address = record.address, .returned_to = thrown},
+                                {.address = record.caller, .returned_to = true}};
+  for (std::size_t i = 0; i < trace.count; ++i)
+    places.push_back({.address = trace.addresses[i], .returned_to = thrown || i > 0});
+  const std::vector<std::string> names = names_of(places);
+  entry.symbol = names[0];
   if (entry.symbol.empty() && record.caller != 0) {
-    entry.symbol = fmt::format("no code; called from {}", names.at(record.caller));
+    entry.symbol = fmt::format("no code; called from {}", names[1]);
   }
   entry.symbol = bounded(entry.symbol);
-  for (std::size_t i = 0; i < fault.back_trace.count; ++i) {
-    const std::uint64_t address = fault.back_trace.addresses[i];
-    const std::string name = names.at(address, i > 0);
-    entry.back_trace.push_back(name.empty() ? fmt::format("{:#x}", address) : bounded(name));
+  for (std::size_t i = 2; i < names.size(); ++i) {
+    entry.back_trace.push_back(names[i].empty() ? fmt::format("{:#x}", places[i].address)
+                                                : bounded(names[i]));
   }
   entry.back_trace_end = describe_end(fault.back_trace);
   return entry;
+}
+
+std::string_view to_string(WatchdogPolicy policy) noexcept {
+  return policy == WatchdogPolicy::task ? "the task" : "the application";
+}
+
+std::string watchdog_of(const TaskConfig& task) {
+  const TaskWatchdog& watchdog = task.watchdog;
+  constexpr double kNsPerMs = 1e6;
+  std::string text;
+  if (watchdog.time > Duration::zero())
+    text += fmt::format(", watchdog {:g} ms x {}", static_cast<double>(watchdog.time.count()) / kNsPerMs,
+                        watchdog.sensitivity);
+  if (watchdog.omitted_cycles > 0) text += fmt::format(", omitted cycles {}", watchdog.omitted_cycles);
+  return text + fmt::format(", a fault stops {}", to_string(watchdog.policy));
 }
 
 }  // namespace
@@ -75,7 +97,8 @@ void Instance::make_outputs_safe(const TaskSet::Fault& fault) {
 
 // Logged, shown in the status page, and written down. The text about it.
 std::string Instance::keep_fault(const TaskSet::Fault& fault) {
-  const ExceptionEntry entry = entry_of(fault, application_->path());
+  ExceptionEntry entry = entry_of(fault, application_->path());
+  add_circumstances(entry, fault.task);
   const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
   std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
   spdlog::error("exception: {}", reason);
@@ -85,6 +108,19 @@ std::string Instance::keep_fault(const TaskSet::Fault& fault) {
     keep_exceptions_of(launch.run_directory, launch.name, std::span(&entry, 1));
   }
   return reason;
+}
+
+void Instance::add_circumstances(ExceptionEntry& entry, std::size_t index) {
+  const TaskConfig& task = application_->tasks()[index];
+  entry.version = PLCHOST_VERSION;
+  entry.build = build_of(application_->path());
+  entry.scheduler = scheduler_;
+  entry.settings =
+      task_settings(task.kind, task.interval, task.iec_priority, cores_.size() == 1 ? cores_.front() : -1) +
+      watchdog_of(task);
+  const auto counters = page_->task(static_cast<std::uint32_t>(index)).counters.read();
+  if (counters) entry.cycles = counters->cycles;
+  entry.uptime_ns = (MonotonicClock::now() - begun_).count();
 }
 
 }  // namespace plchost

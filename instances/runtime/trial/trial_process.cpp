@@ -75,7 +75,7 @@ void describe_crash(const std::string& application, int verdict, int crashes) {
   say(signal != nullptr ? signal : "?");
   constexpr unsigned kSeconds = 2;
   ::alarm(kSeconds);
-  if (const std::string name = SymbolNames().at(crash.address); !name.empty()) say(" in " + name);
+  if (const std::string name = name_of(crash.address); !name.empty()) say(" in " + name);
   say("\n");
   ::_exit(kExitSetupFailed);
 }

@@ -125,7 +125,11 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"abort", "Abort", "signal", "SIGABRT", "abort", ""},
         Fault{"illegal", "Illegal", "signal", "SIGILL", "illegal instruction", "task_faults.so"},
         Fault{"throw", "Throw", "cpp_exception", "", "std::runtime_error left its cycle: the valve is stuck",
-              ""},
+              "setup(plc::Application&)"},
+        Fault{"throw_deep", "ThrowDeep", "cpp_exception", "", "std::runtime_error left its cycle: deep",
+              "throw_deep(int)+0x"},
+        Fault{"variable_throws", "Edge", "cpp_exception", "",
+              "std::runtime_error left its event variable: deep", "throw_deep(int)+0x"},
         Fault{"loop", "Loop", "task_watchdog", "", "the limit is 20.000 ms", "loop()+0x"},
         Fault{"sleep", "Sleep", "task_watchdog", "", "the limit is 20.000 ms", ""},
         Fault{"variable", "Edge", "signal", "SIGFPE",
@@ -171,6 +175,14 @@ const std::vector<Trace> kTraces = {
     {"sleep", {"sleep_for_ever()+0x"}, ""},
     {"variable", {"divide()+0x", "setup(plc::Application&)"}, ""},
     {"call_null", {"call_null()+0x"}, ""},
+    {"throw", {"setup(plc::Application&)"}, ""},
+    {"throw_deep",
+     {"throw_deep(int)+0x", "throw_deep(int)+0x", "throw_deep(int)+0x", "throw_after_a_catch()+0x"},
+     ""},
+    {"throw_again", {"throw_again()"}, ""},
+    {"throw_many_times", std::vector<std::string>(32, "throw_deep(int)+0x"),
+     "only the innermost 32 functions are known"},
+    {"variable_throws", {"throw_deep(int)+0x", "throw_deep(int)+0x", "setup(plc::Application&)"}, ""},
 #if defined(__x86_64__)  // which has return addresses on the stack only
     {"smash_stack",
      {"smash_stack()+0x"},
@@ -181,6 +193,36 @@ const std::vector<Trace> kTraces = {
 
 INSTANTIATE_TEST_SUITE_P(Faults, BackTraceOf, ::testing::ValuesIn(kTraces),
                          [](const auto& test) { return std::string(test.param.event); });
+
+TEST(TaskException, TellsFileAndLineOfEachFunctionWithDebugInformation) {
+  Faulty sut;
+  (void)sut.process().event("throw_deep").post();
+  const ExceptionEntry found = sut.exceptions().front();
+  EXPECT_THAT(found.symbol,
+              ::testing::ContainsRegex(
+                  R"(throw_deep\(int\)\+0x[0-9a-f]+ in task_faults.so at task_faults.cpp:[0-9]+$)"));
+  std::vector<std::string> lines;
+  for (const std::string& function : found.back_trace) {
+    if (function.find("throw_deep(int)") != std::string::npos)
+      lines.push_back(function.substr(function.rfind(':')));
+  }
+  ASSERT_EQ(lines.size(), 3U) << ::testing::PrintToString(found.back_trace);
+  EXPECT_NE(lines[0], lines[1]) << "one throws, the others call";
+  EXPECT_EQ(lines[1], lines[2]);
+}
+
+TEST(TaskException, TellsItsCircumstances) {
+  Faulty sut("[Task.Divide]\nWatchdog.TimeUs=20000\nWatchdog.Sensitivity=2\n");
+  (void)sut.process().event("divide").post();
+  const ExceptionEntry found = sut.exceptions().front();
+  EXPECT_EQ(found.scheduler, "CmpSchedule");
+  EXPECT_THAT(found.settings, AllOf(HasSubstr("external, priority 4, core "),
+                                    HasSubstr(", watchdog 20 ms x 2, a fault stops the application")));
+  EXPECT_NE(found.version, "");
+  EXPECT_THAT(found.build, HasSubstr("build ID "));
+  EXPECT_EQ(found.cycles, 0U);
+  EXPECT_GT(found.uptime_ns, 0);
+}
 
 class EachScheduler : public ::testing::TestWithParam<const char*> {};
 

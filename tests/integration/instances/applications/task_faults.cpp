@@ -26,6 +26,7 @@ int* volatile nowhere = nullptr;
 volatile int sink = 0;
 std::atomic<bool> variable{false};
 std::atomic<bool> variable_is_faulty{false};
+std::atomic<bool> variable_throws{false};
 std::atomic<bool> busy{false};
 std::atomic<bool> overrun{false};
 
@@ -124,6 +125,30 @@ void loop_in_a_thread(int priority, const char* name = "hog", bool blocks_signal
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
+__attribute__((noinline)) void throw_deep(int depth) {
+  if (depth == 0) throw std::runtime_error("deep");
+  throw_deep(depth - 1);
+  sink = depth;
+}
+// One that the code catches is none of the task's.
+__attribute__((noinline)) void throw_after_a_catch() {
+  try {
+    throw_deep(7);
+  } catch (const std::runtime_error&) {
+    sink = 11;
+  }
+  throw_deep(2);
+  sink = 12;
+}
+__attribute__((noinline)) void throw_again() {
+  try {
+    throw_deep(7);
+  } catch (const std::runtime_error&) {
+    throw;
+  }
+  sink = 13;
+}
+
 // Faults that only this processor has.
 #if defined(__x86_64__)
 __attribute__((noinline)) void write_wild() {
@@ -183,6 +208,18 @@ void setup(plc::Application& app) {
   app.external("Abort", 4, "abort", [] { std::abort(); });
   app.external("Illegal", 4, "illegal", [] { __builtin_trap(); });
   app.external("Throw", 4, "throw", [] { throw std::runtime_error("the valve is stuck"); });
+  app.external("ThrowDeep", 4, "throw_deep", [] {
+    throw_after_a_catch();
+    sink = 14;
+  });
+  app.external("ThrowAgain", 4, "throw_again", [] {
+    throw_again();
+    sink = 15;
+  });
+  app.external("ThrowManyTimes", 4, "throw_many_times", [] {
+    throw_deep(40);
+    sink = 16;
+  });
   app.external("WriteWild", 4, "write_wild", write_wild);
   app.external("Break", 4, "break", break_in_a_thread);
   app.external("BadLog", 4, "bad_log", [] { plc_log(0, reinterpret_cast<const char*>(8)); });
@@ -214,10 +251,12 @@ void setup(plc::Application& app) {
   app.external("Overrun", 4, "overrun", [] { overrun = true; });
   app.external("Starve", 4, "starve", [] { spin(300ms); });
   app.external("Variable", 4, "variable", [] { variable_is_faulty = true; });
+  app.external("VariableThrows", 4, "variable_throws", [] { variable_throws = true; });
   app.event(
       "Edge", 5,
       [] {
         if (variable_is_faulty) divide();
+        if (variable_throws) throw_deep(1);
         return variable.load();
       },
       [] {});
