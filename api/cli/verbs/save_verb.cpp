@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/statistics_rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
+#include "api/cli/verbs/audit_tail.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
 #include "api/client/client_core_status.hpp"
 #include "api/client/log_reader.hpp"
@@ -31,12 +33,16 @@ namespace plchost {
 
 namespace {
 
+constexpr std::size_t kMostRecords = 200;  // of the audit log
+
 /// All that a host tells of one instance, for a supporter without access to the host. It comes from status
-/// topics and the log only: none of them has a key or a password.
+/// topics and the log. None of them has a key, a password or a setting that may be
+/// one. The audit log comes from this machine, if the user asks for it and may read it.
 class Report {
  public:
-  Report(CliSession& session, std::string host, std::string instance)
-      : session_(session), host_(std::move(host)), instance_(std::move(instance)) {}
+  /// `audit`: folder of the audit log; empty: without.
+  Report(CliSession& session, std::string host, std::string instance, std::string audit)
+      : session_(session), host_(std::move(host)), instance_(std::move(instance)), audit_(std::move(audit)) {}
 
   /// Nothing is written of a host that does not answer, or of an instance that it does not have.
   Result<Row> make(const std::string& version) {
@@ -56,6 +62,7 @@ class Report {
     add("events", rows_of<plc_EventStatus>());
     add("transitions", transition_rows(session_, instance_));
     add("log", log());
+    if (!audit_.empty()) add("audit", audit_tail(audit_, instance_, kMostRecords));
     report_["missing"] = std::move(missing_);
     return std::move(report_);
   }
@@ -115,6 +122,7 @@ class Report {
   CliSession& session_;
   std::string host_;
   std::string instance_;
+  std::string audit_;
   ControlClient* client_ = nullptr;
   Row report_;
   Row missing_ = Row::array();
@@ -144,11 +152,11 @@ Result<void> write_for_owner(const std::string& file, std::string_view text) {
 }
 
 int save_report(CliSession& session, const std::string& instance, const std::string& file,
-                const std::string& version) {
+                const std::string& audit, const std::string& version) {
   if (const auto plain = check_is_plain(file); !plain) return CliSession::fail(plain.error());
   auto host = session.target_host();
   if (!host) return CliSession::fail(host.error());
-  Report report(session, *std::move(host), instance);
+  Report report(session, *std::move(host), instance, audit);
   const auto made = report.make(version);
   if (!made) return CliSession::fail(made.error());
   const std::string text = made->dump(2, ' ', true, Row::error_handler_t::replace) + "\n";
@@ -165,12 +173,16 @@ int save_report(CliSession& session, const std::string& instance, const std::str
 void add_save_verb(const Command& plcctl, CliSession& session, const std::string& version) {
   const auto instance = std::make_shared<std::string>();
   const auto file = std::make_shared<std::string>();
+  const auto audit = std::make_shared<std::optional<std::string>>();
   plcctl.verb("save", "Write all that is known of an instance into a file")
       .noun("report",
             "Write what a supporter needs of an instance: versions, check of the host, tasks, exception, log",
-            [&session, instance, file, version] { return save_report(session, *instance, *file, version); })
+            [&session, instance, file, audit, version] {
+              return save_report(session, *instance, *file, audit->value_or(""), version);
+            })
       .argument("INSTANCE", *instance)
-      .argument("FILE", *file, "JSON; only its owner may read it");
+      .argument("FILE", *file, "JSON; only its owner may read it")
+      .option("--audit", *audit, "Also the last 200 records of the audit log in this folder of this machine");
 }
 
 }  // namespace plchost

@@ -126,6 +126,14 @@ std::string format_exception(Row row) {
     row[field] = address != 0 ? fmt::format("{:#x}", address) : "";
   }
   row.erase("time_unix_ns");
+  constexpr double kNsPerSecond = 1e9;
+  if (row.contains("uptime_ns") && row["uptime_ns"].is_number()) {
+    row["uptime"] = fmt::format("{:.1f} s", row["uptime_ns"].get<double>() / kNsPerSecond);
+    row.erase("uptime_ns");
+  }
+  const Row end = row["back_trace_end"];  // beside the back-trace
+  row.erase("back_trace_end");
+  row["back_trace_end"] = end;
   const auto back_trace = row["back_trace"].get<std::string>();
   row.erase("back_trace");
   Row said;

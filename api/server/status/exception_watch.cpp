@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include <code_words.hpp>
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include "api/dds/field_info.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/log/log.hpp"
 
@@ -31,6 +34,23 @@ void show_back_trace(plc_ExceptionStatus& sample, const ExceptionEntry& entry) {
                                             : fmt::format("only the innermost {} functions fit", count));
 }
 
+std::vector<plc_KeyValue> circumstances_of(const ExceptionEntry& entry) {
+  std::vector<plc_KeyValue> circumstances;
+  const auto add = [&](const char* name, std::string_view value) {
+    if (value.empty()) return;
+    plc_KeyValue& added = circumstances.emplace_back();
+    dds::copy_text(added.name, name);
+    dds::copy_text(added.value, value);
+  };
+  add("version", entry.version);
+  add("build", entry.build);
+  add("scheduler", entry.scheduler);
+  add("settings", entry.settings);
+  if (!entry.settings.empty()) add("cycles", fmt::format("{}", entry.cycles));
+  if (entry.uptime_ns != 0) add("uptime_ns", fmt::format("{}", entry.uptime_ns));
+  return circumstances;
+}
+
 }  // namespace
 
 bool ExceptionWatch::follow(const InstanceStatus& instance, const TaskWatch& tasks, TimePoint now) {
@@ -50,26 +70,17 @@ bool ExceptionWatch::follow(const InstanceStatus& instance, const TaskWatch& tas
 }
 
 bool ExceptionWatch::end_round() {
+  const bool changed = table_->dispose_rest();  // while the samples have their circumstances
   std::erase_if(instances_, [](const auto& entry) { return !entry.second.followed; });
   for (auto& [name, watched] : instances_) watched.followed = false;
-  const bool changed = table_->dispose_rest();
   table_->write();
   return changed;
-}
-
-ExceptionWatch::Version ExceptionWatch::version_of(const std::string& path) {
-  struct stat status{};
-  if (::stat(path.c_str(), &status) != 0) return {};
-  constexpr std::int64_t kPerSecond = 1'000'000'000;
-  return {.inode = status.st_ino,
-          .size = status.st_size,
-          .changed_ns = status.st_mtim.tv_sec * kPerSecond + status.st_mtim.tv_nsec};
 }
 
 void ExceptionWatch::look(Watched& watched, const std::string& name) {
   const std::string path = exception_path(run_directory_, name);
   // Before it is read: a file that is replaced meanwhile is another version at the next look.
-  const Version version = version_of(path);
+  const FileVersion version = FileVersion::of(path);
   const bool is_new = dds::text_of(watched.sample.instance).empty();
   if (!is_new && version == watched.version) return;
   watched.version = version;
@@ -79,14 +90,15 @@ void ExceptionWatch::look(Watched& watched, const std::string& name) {
   }
   const auto history = read_exceptions(path);
   if (history) {
-    show(watched.sample, *history);
+    show(watched, *history);
   } else {
     spdlog::warn("the exceptions of instance '{}' cannot be read, what was known is shown: {}", name,
                  history.error().describe());
   }
 }
 
-void ExceptionWatch::show(plc_ExceptionStatus& sample, const ExceptionHistory& history) const {
+void ExceptionWatch::show(Watched& watched, const ExceptionHistory& history) {
+  plc_ExceptionStatus& sample = watched.sample;
   const ExceptionEntry last = history.entries.empty() ? ExceptionEntry{} : history.entries.back();
   sample.count = std::max<std::uint64_t>(history.count, history.entries.size());
   sample.whole_application = !history.entries.empty() && last.whole_application;
@@ -100,6 +112,9 @@ void ExceptionWatch::show(plc_ExceptionStatus& sample, const ExceptionHistory& h
   dds::copy_text(sample.text, last.text);
   dds::copy_text(sample.application, last.application);
   show_back_trace(sample, last);
+  // The table has the sample with the ones before until it gets this one.
+  watched.before = std::exchange(watched.circumstances, circumstances_of(last));
+  dds::lend(sample.ext, watched.circumstances);
 }
 
 }  // namespace plchost

@@ -4,13 +4,14 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <control.h>
-#include <sys/types.h>
 
 #include "api/server/status/status_table.hpp"
 #include "api/server/status/task_watch.hpp"
 #include "shm/base/time.hpp"
+#include "shm/files/file_version.hpp"
 #include "shm/pages/exception_history.hpp"
 #include "shm/pages/host_page.hpp"
 
@@ -34,24 +35,18 @@ class ExceptionWatch {
   bool end_round();
 
  private:
-  /// Tells one version of a file from another: it is replaced as a whole.
-  struct Version {
-    ino_t inode = 0;  // 0: no file
-    off_t size = 0;
-    std::int64_t changed_ns = 0;
-    bool operator==(const Version&) const = default;
-  };
   struct Watched {
     std::int32_t pid = 0;
     InstanceState state = InstanceState::offline;
     TimePoint next_look;
-    Version version;
+    FileVersion version;
     plc_ExceptionStatus sample{};
+    std::vector<plc_KeyValue> circumstances;  // the sample has them on loan
+    std::vector<plc_KeyValue> before;
     bool followed = true;  // in this round
   };
-  [[nodiscard]] static Version version_of(const std::string& path);
   void look(Watched& watched, const std::string& name);
-  void show(plc_ExceptionStatus& sample, const ExceptionHistory& history) const;
+  static void show(Watched& watched, const ExceptionHistory& history);
 
   std::string run_directory_;
   StatusTable<plc_ExceptionStatus>* table_;

@@ -23,7 +23,7 @@ struct StatusSource {
 };
 
 /// The present samples of one status topic, and those that have still to be written. Samples are compared as
-/// bytes, so each begins as blank(). Their ext is empty.
+/// bytes, so each begins as blank(). Their ext is empty, or on loan from memory that outlives them here.
 template <class Sample>
   requires std::is_trivially_copyable_v<Sample>
 class StatusTable {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <string>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -42,7 +43,13 @@ class ExceptionOfAnInstance : public testing::Test {
                  .symbol = "divide()+0x12 in line.so",
                  .text = "integer division by zero",
                  .back_trace = {"divide()+0x12 in line.so", "fill()+0x7 in line.so"},
-                 .back_trace_end = "only a part is known"});
+                 .back_trace_end = "only a part is known",
+                 .version = "0.1.0",
+                 .build = "GCC 12, build ID 4f",
+                 .scheduler = "CmpSchedule",
+                 .settings = "cyclic, interval 10 ms, priority 4, core 1",
+                 .cycles = 77,
+                 .uptime_ns = 12'345'000'000});
     ASSERT_TRUE(write_exceptions(path(), history));
   }
   std::optional<plc_ExceptionStatus> shown(const std::string& instance) {
@@ -172,12 +179,20 @@ TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
                                      "  #0  divide()+0x12 in line.so\n"
                                      "  #1  fill()+0x7 in line.so\n"));
   EXPECT_THAT(text.output, Not(HasSubstr("memory_address"))) << "nothing is known of it";
+  EXPECT_THAT(text.output, AllOf(HasSubstr("settings        cyclic, interval 10 ms, priority 4, core 1\n"),
+                                 HasSubstr("cycles          77\n"), HasSubstr("uptime          12.3 s\n")));
   const auto json = nlohmann::json::parse(run({"show", "exception", "line1", "--json"}).output);
   ASSERT_EQ(json.size(), 1U);
   EXPECT_EQ(json[0]["count"], 1);
   EXPECT_EQ(json[0]["address"], 0x7f0012345678);
   EXPECT_EQ(json[0]["time_unix_ns"], 1'789'000'000'123'456'789);
   EXPECT_EQ(json[0]["stopped"], "application");
+  EXPECT_EQ(json[0]["uptime_ns"], 12'345'000'000);
+  EXPECT_EQ(json[0]["version"], "0.1.0");
+  EXPECT_EQ(json[0]["build"], "GCC 12, build ID 4f");
+  EXPECT_EQ(json[0]["scheduler"], "CmpSchedule");
+  EXPECT_EQ(json[0]["settings"], "cyclic, interval 10 ms, priority 4, core 1");
+  EXPECT_EQ(json[0]["cycles"], 77);
   EXPECT_EQ(json[0]["back_trace"], "divide()+0x12 in line.so\nfill()+0x7 in line.so");
   const auto list = nlohmann::json::parse(run({"list", "exceptions", "--json"}).output);
   ASSERT_EQ(list.size(), 1U) << "line2 never had any";
@@ -200,7 +215,8 @@ TEST_F(ExceptionOfAnInstance, HasAsManyWholeFunctionsAsThereIsRoomFor) {
 
 TEST_F(ExceptionOfAnInstance, IsInTheReport) {
   add("Fill");
-  ASSERT_TRUE(eventually_shown(1));
+  add("Label");
+  ASSERT_TRUE(eventually_shown(2));
   const std::string file = path() + ".report.json";
   const auto saved = run({"--timeout", "2", "save", "report", "line1", file});
   ASSERT_EQ(saved.code, 0) << saved.errors;
@@ -214,7 +230,9 @@ TEST_F(ExceptionOfAnInstance, IsInTheReport) {
   ASSERT_EQ(report["instance"].size(), 1U) << "line2 is none of its";
   EXPECT_EQ(report["instance"][0]["name"], "line1");
   ASSERT_EQ(report["exception"].size(), 1U);
-  EXPECT_EQ(report["exception"][0]["task"], "Fill");
+  EXPECT_EQ(report["exception"][0]["task"], "Label");
+  EXPECT_EQ(report["exception"][0]["settings"], "cyclic, interval 10 ms, priority 4, core 1");
+  EXPECT_FALSE(report.contains("audit")) << "nobody has asked for it";
   for (const char* const part : {"applications", "tasks", "events", "transitions"}) {
     EXPECT_TRUE(report[part].is_array()) << part;
   }
@@ -228,6 +246,37 @@ TEST_F(ExceptionOfAnInstance, IsInTheReport) {
   EXPECT_EQ(unknown.code, 1);
   EXPECT_THAT(unknown.errors, HasSubstr("no instance 'line3'"));
   EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+TEST_F(ExceptionOfAnInstance, IsInAReportThatTellsNoSecret) {
+  add("Fill");
+  ASSERT_TRUE(eventually_shown(1));
+  namespace fs = std::filesystem;
+  // Where a host has secrets: settings, which may be passwords, keys, values of variables in the audit log.
+  for (const char* const name : {"line1.settings", "line1.key", "host.pem", "line1.events"})
+    std::ofstream(host_.run_directory() + "/" + name) << "Parameter.Password=swordfish\nPRIVATE KEY\n";
+  const std::string audit = path() + ".audit";
+  fs::create_directory(audit);
+  std::ofstream(audit + "/audit.0000000001.log")
+      << R"({"n":1,"who":"anna","what":"write variable","on":"line1","argument":"Pin=swordfish","text":"swordfish before"})"
+      << "\n"
+      << R"({"n":2,"who":"anna","what":"stop","on":"line1","argument":"","text":""})" << "\n"
+      << R"({"n":3,"who":"anna","what":"stop","on":"line2","argument":"","text":"swordfish"})" << "\n{torn";
+  const std::string file = path() + ".report.json";
+  const auto saved = run({"--timeout", "2", "save", "report", "line1", file, "--audit", audit});
+  ASSERT_EQ(saved.code, 0) << saved.errors;
+  std::ifstream stream(file);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  fs::remove(file);
+  for (const char* const secret : {"swordfish", "PRIVATE", "Password"})
+    EXPECT_THAT(text, Not(HasSubstr(secret)));
+  const auto records = nlohmann::json::parse(text)["audit"];
+  ASSERT_EQ(records.size(), 2U);
+  EXPECT_EQ(records[0]["argument"], "Pin");
+  EXPECT_EQ(records[1]["what"], "stop");
+  const auto refused = run({"--timeout", "2", "save", "report", "line1", file, "--audit", audit + "/none"});
+  EXPECT_THAT(refused.output + refused.errors, HasSubstr("has not all: audit: "));
+  fs::remove(file);
 }
 
 TEST_F(ExceptionOfAnInstance, IsInNoReportInPlaceOfWhatIsNoPlainFile) {
