@@ -23,6 +23,9 @@ struct ServerOptions {
   bool allow_unsecured = false;  ///< without an identity: may be on other interfaces than "lo"
   /// How many datagrams were refused so far, for the log; null: nobody counts.
   std::uint64_t (*refused_datagrams)() noexcept = nullptr;
+  /// The words of its participant for other hosts (dds::words_of()); empty: none. With them it is not there
+  /// for hosts that it does not concern, so it has to do the same (close_receive_gate()).
+  std::string announced;
   std::string blocks_base =
       std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
   std::vector<std::string> labels;     ///< by which clients choose hosts

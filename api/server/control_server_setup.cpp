@@ -13,6 +13,7 @@
 
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
+#include "api/dds/qos.hpp"
 #include "api/dds/secured_announcement.h"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
@@ -153,8 +154,10 @@ Result<void> ControlServer::Parts::make_guard() {
 Result<void> ControlServer::Parts::enter_domain() {
   dds::install_log_sink();
   PLCHOST_TRY_ASSIGN(domain, dds::open_domain(dds::Role::server, options.dds));
+  dds::Qos qos;
+  if (!options.announced.empty()) qos.user_data(options.announced);
   PLCHOST_TRY_ASSIGN(participant,
-                     dds::make_participant(options.dds.domain, nullptr,
+                     dds::make_participant(options.dds.domain, qos.get(),
                                            "enter DDS domain " + std::to_string(options.dds.domain) +
                                                " (at most 16 servers on one machine)"));
   if (identity_watch && !plc_announce_secured(participant.get())) {

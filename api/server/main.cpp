@@ -6,6 +6,7 @@
 
 #include "api/control/exit_codes.hpp"
 #include "api/dds/cyclone_version.h"
+#include "api/dds/gate/host_mark.hpp"
 #include "api/server/access/own_user.hpp"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
@@ -117,7 +118,9 @@ int main(int argc, char** argv) {
   if (const char* const why = plc_unknown_cyclone(); why != nullptr)
     spdlog::warn("{}: memory of clients that have ended is not given back", why);
   options.dds.receive_fifo = plchost::dds::can_use_fifo(kReceiveFifo) ? kReceiveFifo : 0;
-  plchost::close_receive_gate(!options.dds.identity.empty());
+  const plchost::dds::HostMark mark{.name = options.host, .sends_blocks = options.host_number != 0};
+  plchost::close_receive_gate(!options.dds.identity.empty(), mark);
+  options.announced = plchost::dds::words_of(mark);
   options.refused_datagrams = plchost::datagrams_refused;
   const auto server = plchost::ControlServer::create(std::move(options));
   if (!server) return fail(server.error());

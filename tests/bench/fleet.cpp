@@ -27,6 +27,7 @@ constexpr int kCommandsOfStarts = 6;   // one look and one command of each kind 
 constexpr int kPatienceSeconds = 120;  // until all hosts are there
 constexpr Duration kRestLook = std::chrono::seconds(1);
 constexpr int kRestLooks = 60;
+constexpr double kFewDatagrams = 10;  // announcements that fall into one second or into the next
 
 /// The processes of a host, as the host shows them.
 struct HostProcesses {
@@ -119,7 +120,7 @@ class Fleet {
     return Duration(all);
   }
 
-  /// Until two seconds that follow each other have the same traffic, but for a tenth.
+  /// Until two seconds that follow each other have the same traffic, but for a tenth or ten datagrams.
   Result<void> settle(const NetworkSpace& machine) {
     double last = 0;
     PLCHOST_TRY_ASSIGN(Traffic before, machine.traffic(kCable));
@@ -127,7 +128,7 @@ class Fleet {
       std::this_thread::sleep_for(kRestLook);
       PLCHOST_TRY_ASSIGN(const Traffic now, machine.traffic(kCable));
       const double datagrams = (now - before).received_datagrams;
-      if (look > 0 && std::abs(datagrams - last) <= last / 10) return {};
+      if (look > 0 && std::abs(datagrams - last) <= std::max(last / 10, kFewDatagrams)) return {};
       last = datagrams;
       before = now;
     }

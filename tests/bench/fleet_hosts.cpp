@@ -41,10 +41,10 @@ std::string FleetHosts::configure(const Plan& plan, int number) const {
 
 namespace {
 
-/// Until the processors have nothing to do for a third of a look, 10 s at most.
+/// Until the processors have nothing to do for a third of a look, 1 s at most.
 Result<void> wait_for_rest() {
-  constexpr Duration kLook = std::chrono::milliseconds(300);
-  constexpr int kLooks = 33;
+  constexpr Duration kLook = std::chrono::milliseconds(250);
+  constexpr int kLooks = 4;
   for (int look = 0; look < kLooks; ++look) {
     PLCHOST_TRY_ASSIGN(const Duration before, idle_time());
     std::this_thread::sleep_for(kLook);

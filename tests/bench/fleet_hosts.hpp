@@ -26,9 +26,8 @@ class FleetHosts {
   FleetHosts& operator=(const FleetHosts&) = delete;
   ~FleetHosts();
 
-  /// One host after the other. Each new one is discovered by all that are there. The machine of the
-  /// benchmark, on which all of them run, would be too busy for the leases of DDS if the next one did not
-  /// wait until it rests.
+  /// One host after the other. All of them run on the machine of the benchmark. It would be too busy for the
+  /// leases of DDS if they began together.
   [[nodiscard]] Result<void> start(const Plan& plan, const FleetNetwork& network, int hosts);
 
  private:

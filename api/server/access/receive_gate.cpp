@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <string>
 
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -23,6 +24,16 @@ enum class Gate : std::uint8_t { open, unsecured, secured };
 
 std::atomic<Gate> gate{Gate::open};
 std::atomic<std::uint64_t> refused{0};
+
+// Written before DDS has threads. Never destroyed: these may outlive it.
+struct OwnHost {
+  std::string name;
+  bool sends_blocks = false;
+};
+OwnHost& own_host() {
+  static auto* const own = new OwnHost;  // NOLINT(cppcoreguidelines-owning-memory)
+  return *own;
+}
 
 bool is_of_network(const msghdr& message) noexcept {
   if (message.msg_name == nullptr || message.msg_namelen < sizeof(sa_family_t)) return false;
@@ -60,15 +71,19 @@ std::size_t let_pass(std::span<std::byte> buffer, std::size_t size, bool secured
     refused.fetch_add(1, std::memory_order_relaxed);
     return 0;
   }
-  if (!secured) return size;
-  static dds::HandshakeAssembly assembly;
-  return dds::take_out_doubted(buffer.first(assembly.rewrite(buffer, size)), dds::own_record());
+  if (secured) {
+    static dds::HandshakeAssembly assembly;
+    size = dds::take_out_doubted(buffer.first(assembly.rewrite(buffer, size)), dds::own_record());
+  }
+  const OwnHost& own = own_host();
+  return dds::take_out_other_hosts(buffer.first(size), {.name = own.name, .sends_blocks = own.sends_blocks});
 }
 
 }  // namespace
 
-void close_receive_gate(bool secured) noexcept {
-  gate.store(secured ? Gate::secured : Gate::unsecured, std::memory_order_relaxed);
+void close_receive_gate(bool secured, const dds::HostMark& own) {
+  own_host() = {.name = std::string(own.name), .sends_blocks = own.sends_blocks};
+  gate.store(secured ? Gate::secured : Gate::unsecured, std::memory_order_release);
 }
 
 std::uint64_t datagrams_refused() noexcept {
@@ -81,7 +96,7 @@ std::uint64_t datagrams_refused() noexcept {
 // all datagrams by this one.
 extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int socket, msghdr* message, int flags) {
   const ssize_t got = ::syscall(SYS_recvmsg, socket, message, flags);
-  const auto gate = plchost::gate.load(std::memory_order_relaxed);
+  const auto gate = plchost::gate.load(std::memory_order_acquire);
   // DDS gives one buffer, large enough for every datagram.
   if (got <= 0 || gate == plchost::Gate::open || message->msg_iovlen != 1 ||
       !plchost::is_of_network(*message)) {
