@@ -83,19 +83,21 @@ bool MemoryGuard::is_lost(const void* address) noexcept {
   });
 }
 
+// The touch may be an atomic access. The thread sanitizer makes those under a lock of its own. It takes that
+// lock for any access that acquires or releases, and for mmap() of the C library: here for ever. So fences
+// order the accesses, and the kernel is called directly.
 bool MemoryGuard::mend(const void* address) noexcept {
   const auto at = reinterpret_cast<std::uintptr_t>(address);
   for (Slot& slot : slots) {
-    const std::uintptr_t end = slot.end.load(std::memory_order_acquire);
+    const std::uintptr_t end = slot.end.load(std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_acquire);
     const std::uintptr_t begin = slot.begin.load(std::memory_order_relaxed);
     if (at < begin || at >= end) continue;
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): it is an address
-    void* const memory = reinterpret_cast<void*>(begin);
-    const void* const zeros =
-        ::mmap(memory, end - begin, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0);
-    if (zeros == MAP_FAILED) return false;
+    constexpr int kZeros = MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED;
+    if (::syscall(SYS_mmap, begin, end - begin, PROT_READ | PROT_WRITE, kZeros, -1, 0) == -1) return false;
     slot.lost.store(true, std::memory_order_relaxed);
-    lost_any.store(true, std::memory_order_release);
+    std::atomic_thread_fence(std::memory_order_release);
+    lost_any.store(true, std::memory_order_relaxed);
     return true;
   }
   return false;

@@ -1,6 +1,8 @@
 #include "shm/guard/memory_guard.hpp"
 
+#include <atomic>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <span>
 #include <thread>
@@ -45,9 +47,9 @@ class GuardedMemory : public testing::Test {
   [[nodiscard]] std::byte look() const { return static_cast<const volatile std::byte&>(memory[17]); }
 
   std::span<std::byte> memory;
+  UniqueFd file_{::memfd_create("guarded", MFD_CLOEXEC)};
 
  private:
-  UniqueFd file_{::memfd_create("guarded", MFD_CLOEXEC)};
   struct sigaction before_{};
 };
 
@@ -63,6 +65,23 @@ TEST_F(GuardedMemory, IsZeroOnceItsFileWasCutShortAndStaysSo) {
   memory[17] = std::byte{7};
   EXPECT_EQ(look(), std::byte{7});
   EXPECT_TRUE(sut.lost());
+}
+
+// The thread sanitizer makes such an access under a lock of its own, which the handler must not need.
+TEST_F(GuardedMemory, IsZeroForAtomicAccessesToo) {
+  const auto touch = [this](auto access) {
+    const MemoryGuard sut(memory);
+    void* const shared =
+        ::mmap(memory.data(), kSize, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, file_.get(), 0);
+    ASSERT_EQ(shared, memory.data());
+    resize(0);
+    access(std::atomic_ref(*reinterpret_cast<std::uint32_t*>(memory.data())));
+    EXPECT_TRUE(sut.lost());
+    resize(kSize);
+  };
+  touch([](auto word) { EXPECT_EQ(word.load(std::memory_order_acquire), 0U); });
+  touch([](auto word) { EXPECT_EQ(word.fetch_add(1, std::memory_order_acq_rel), 0U); });
+  touch([](auto word) { word.store(1, std::memory_order_release); });
 }
 
 TEST_F(GuardedMemory, OtherMemoryIsNotTouched) {
