@@ -34,6 +34,7 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
   if (!fault_fd) return failure(ErrorCode::system, "cannot create an event descriptor for faults", errno);
   std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment), std::move(fault_fd)));
   self->fault_board_.tell(self->environment_.halted);
+  self->poller_.tell_in(self->environment_.poll_flight);
   for (TaskConfig& config : tasks) {
     const std::string step = fmt::format("task '{}'", config.name);
     PLCHOST_TRY(in_step(step, self->add(std::move(config))));
@@ -49,6 +50,7 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
 Result<void> TaskSet::supervise() {
   if (auto installed = install_fault_handlers(); !installed) return installed;
   supervision_.emplace(clock_, tasks_, poller_.trap());
+  supervision_->tell_in(environment_.watch_flight);
   return supervision_->start_thread(environment_.allow_unprivileged ? ThreadPriority{}
                                                                     : supervision_priority(band_));
 }
@@ -66,6 +68,7 @@ Result<void> TaskSet::add(TaskConfig config) {
   if (environment_.fault_record) {
     tasks_.back()->fault().show_in(&environment_.fault_record(tasks_.size() - 1));
   }
+  if (environment_.flight) tasks_.back()->tell_in(environment_.flight(tasks_.size() - 1));
   Task& task = *tasks_.back();
   if (task.kind().has_grid) task.follow(distributed_clock_.add_follower(task.config().iec_priority));
   if (task.latch() != nullptr) poller_.add(task);
@@ -163,8 +166,10 @@ std::optional<Duration> TaskSet::between_cycles(const std::function<void()>& act
   const bool alone = tasks_in_cycle().empty();
   if (alone) action();
   gate_.open(clock_);
+  const TimePoint opened = MonotonicClock::now();
+  environment_.control_flight.put(opened, FlightKind::held, (opened - closed).count());
   if (!alone) return std::nullopt;
-  return MonotonicClock::now() - closed;
+  return opened - closed;
 }
 
 bool TaskSet::stands_still() const noexcept {
@@ -188,6 +193,7 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
     const FaultRecord* const record = tasks_[i]->fault().published();
     if (record == nullptr || fault_taken_[i]) continue;
     fault_taken_[i] = true;
+    tell_fault(i, *record);
     return Fault{.task = i,
                  .name = tasks_[i]->config().name,
                  .record = *record,
@@ -195,6 +201,14 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
                  .whole_application = fault_board_.halted()};
   }
   return std::nullopt;
+}
+
+// At its own time, by the clock of the recorder.
+void TaskSet::tell_fault(std::size_t task, const FaultRecord& record) {
+  constexpr int kKinds = 256;
+  const Duration since(std::max<std::int64_t>(unix_time_ns() - record.unix_ns, 0));
+  const auto figure = static_cast<std::int64_t>(task) * kKinds + std::to_underlying(record.kind);
+  environment_.control_flight.put(MonotonicClock::now() - since, FlightKind::fault, figure);
 }
 
 void TaskSet::look_after_posts() noexcept {

@@ -22,6 +22,7 @@
 #include "schedulers/tick/tick_source.hpp"
 #include "schedulers/tick/ticker.hpp"
 #include "shm/base/counted_event.hpp"
+#include "shm/base/flight_ring.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -80,6 +81,11 @@ struct TaskEnvironment {
   /// Tells that no task begins another cycle: a fault of the whole application. May be empty. Called by its
   /// finder, in a signal handler perhaps, and once more for each further one.
   std::function<void()> halted{};
+  /// Where task number `index` tells of its cycles. May be empty. The memory outlives the TaskSet.
+  std::function<FlightRing(std::size_t index)> flight{};
+  FlightRing control_flight{};  ///< where the control thread tells what it does with all tasks
+  FlightRing watch_flight{};    ///< where the supervision tells of hits and of its own delays
+  FlightRing poll_flight{};     ///< where the reader of event variables tells of long readings
   /// Faults and endless loops in the application's code put their task into exception: handlers for signals
   /// are installed in this process (see install_fault_handlers()), and a thread supervises the tasks. Without
   /// it a fault ends the process.
@@ -256,6 +262,7 @@ class TaskSet {
   [[nodiscard]] Result<void> reset_statistics(Task& task);
   [[nodiscard]] Result<void> check_startable();
   void hand_out_sources();
+  void tell_fault(std::size_t task, const FaultRecord& record);
   void report(std::size_t index, bool running);
   void begin_second_phase();
   void park_tasks(bool that_drive_outputs);

@@ -26,6 +26,7 @@ Result<void> TaskSet::begin_stop(const StopLimits& limits) {
   late_variable_.reset();
   // From now on releases are missed on purpose; cycles that run are watched on.
   if (supervision_) supervision_->tasks_stop();
+  environment_.control_flight.put(clock_.now(), FlightKind::stopping);
   park_tasks(true);
   // Only now: a delay of this thread's question is no time that the tasks have had.
   stop_->deadline = MonotonicClock::now() + limits.outputs;

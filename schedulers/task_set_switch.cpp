@@ -108,6 +108,7 @@ void TaskSet::start(Prepared prepared) {
     watch(settings);
     if (looked) (void)tick_by(*active_);
     hand_out_sources();
+    environment_.control_flight.put(clock_.now(), FlightKind::started);
   }
   // All, also a task whose thread gets no core for longer than this waits: nobody would look again.
   for (std::size_t i = 0; i < tasks_.size(); ++i) report(i, true);
@@ -123,6 +124,7 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
   {
     // Nothing but the tasks themselves may delay the exchange.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
+    const TimePoint from = clock_.now();
     if (!tick_by(*arrangement)) {
       ticker_.use(nullptr);
       retired_.push_back(std::move(arrangement));  // the ticker may take its plan until it has seen the next
@@ -134,6 +136,8 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     watch(settings);
     distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
     hand_out_sources();
+    const TimePoint to = clock_.now();
+    environment_.control_flight.put(to, FlightKind::switched, (to - from).count());
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};

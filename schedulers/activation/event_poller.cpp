@@ -16,6 +16,7 @@ template <class Use>
 void EventPoller::read_all(TimePoint now, Use use) noexcept {
   if (polled_.empty()) return;
   const CycleGate::Stay within(&gate_, trap_.seat(), clock_);
+  const TimePoint from = clock_.now();
   trap_.arm(*polled_.front().fault, now, true);
   for (const Polled& polled : polled_) {
     if (polled.fault->raised()) continue;
@@ -28,6 +29,8 @@ void EventPoller::read_all(TimePoint now, Use use) noexcept {
     }
   }
   trap_.disarm();
+  const TimePoint to = clock_.now();
+  if (to - from >= kToldReading) flight_.put(to, FlightKind::polled, (to - from).count());
 }
 
 void EventPoller::prime(TimePoint now) noexcept {

@@ -7,6 +7,7 @@
 
 #include "schedulers/tasks/event_latch.hpp"
 #include "schedulers/tasks/task.hpp"
+#include "shm/base/flight_ring.hpp"
 
 namespace plchost {
 
@@ -21,6 +22,10 @@ class EventPoller {
   /// `max_backlog` >= 1: of edges that are raised by call, the runs that a task may lag behind. The thread
   /// that polls.
   void set_max_backlog(std::uint64_t max_backlog) noexcept { max_backlog_ = max_backlog; }
+  /// A reading that takes this long is told in `ring`, whose memory outlives this. Set-up, before the first
+  /// look.
+  static constexpr Duration kToldReading = std::chrono::microseconds(100);
+  void tell_in(FlightRing ring) noexcept { flight_ = ring; }
   /// Catches what is faulty in the variables' code. Any thread.
   [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
   [[nodiscard]] const FaultTrap& trap() const noexcept { return trap_; }
@@ -49,6 +54,7 @@ class EventPoller {
   FaultTrap trap_;
   CycleGate& gate_;
   std::vector<Polled> polled_;
+  FlightRing flight_;
 };
 
 }  // namespace plchost

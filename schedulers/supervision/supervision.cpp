@@ -104,6 +104,9 @@ void Supervision::run() noexcept {
     const TimePoint next = off ? kNoDeadline : look(clock_.now());
     next_look_.store(next == kNoDeadline ? 0 : next.time_since_epoch().count(), std::memory_order_relaxed);
     clock_.wait(order_, order, next);
+    if (next == kNoDeadline) continue;
+    const TimePoint woken = clock_.now();
+    if (woken - next >= kToldDelay) flight_.put(woken, FlightKind::late, (woken - next).count());
   }
 }
 
@@ -217,6 +220,8 @@ void Supervision::strike(Watched& watched, TimePoint since, TimePoint now, Fault
   if (watched.struck_since == since) return;
   watched.struck_since = since;
   watched.struck_at = now;
+  constexpr int kKinds = 256;
+  flight_.put(now, FlightKind::struck, (&watched - watched_.data()) * kKinds + std::to_underlying(kind));
   watched.trap->strike(since, kind, figure, limit);
 }
 

@@ -11,6 +11,7 @@
 #include "schedulers/supervision/starvation.hpp"
 #include "schedulers/supervision/watchdog_rules.hpp"
 #include "schedulers/tasks/task.hpp"
+#include "shm/base/flight_ring.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost {
@@ -38,6 +39,11 @@ class Supervision {
   Supervision& operator=(const Supervision&) = delete;
   ~Supervision();
 
+  /// Hits, and wakes that come too late, are told in `ring`, whose memory outlives this. Set-up, before the
+  /// thread is started.
+  void tell_in(FlightRing ring) noexcept { flight_ = ring; }
+  /// A wake that is less late than this says nothing of the core.
+  static constexpr Duration kToldDelay = std::chrono::microseconds(200);
   [[nodiscard]] Result<void> start_thread(ThreadPriority priority);
 
   /// By how much it is too late to look: threads above it take the processor. Any thread.
@@ -106,6 +112,7 @@ class Supervision {
   Starvation starvation_;
 
   // The thread's own.
+  FlightRing flight_;
   LoadRule load_;
   LoadRule overload_;
   bool overload_measured_ = false;  // since the window began

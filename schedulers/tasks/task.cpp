@@ -7,6 +7,17 @@
 
 namespace plchost {
 
+namespace {
+
+// Of the task whose code this thread runs.
+thread_local FlightRing* flight_of_thread = nullptr;
+
+}  // namespace
+
+FlightRing* Task::flight_here() noexcept {
+  return flight_of_thread;
+}
+
 Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
            FaultBoard* board) noexcept
     : clock_(clock),
@@ -61,14 +72,17 @@ Task::Pace Task::pace() const noexcept {
 
 // false: it did not come to its end.
 bool Task::run_entry() noexcept {
+  flight_of_thread = &flight_;
+  bool ended = false;
   try {
     config_.entry();
-    return true;
+    ended = true;
   } catch (const ThrowProbe&) {  // never: it only looks at the stack
   } catch (...) {
     raise_current_exception(fault_);
   }
-  return false;
+  flight_of_thread = nullptr;
+  return ended;
 }
 
 void Task::look_at_overrun(Duration execution) noexcept {
@@ -87,6 +101,7 @@ void Task::run_cycle(const Activation& activation) noexcept {
   const CycleGate::Stay within(gate_, trap_.seat(), clock_);
   state_->cycle_begins(activation.release);
   const TimePoint start = clock_.now();
+  tell_start(activation, start);
   if (config_.before_entry) config_.before_entry();
   const TimePoint entered = config_.before_entry ? clock_.now() : start;
   trap_.arm(fault_, entered);
@@ -97,7 +112,10 @@ void Task::run_cycle(const Activation& activation) noexcept {
   if (config_.after_entry) config_.after_entry();
   const TimePoint end = config_.after_entry ? clock_.now() : left;
   const Duration still = std::exchange(stood_still_, Duration::zero());
-  state_->cycle_ended(activation.release, end);
+  flight_.put(end, FlightKind::end, activation.spun.count());
+  if (const Duration by = state_->cycle_ended(activation.release, end); by != Duration::zero()) {
+    flight_.put(end, FlightKind::moved, by.count());
+  }
   if (still > Duration::zero()) pass_over(end, still);
   record(activation, start, end - still, std::exchange(ready_, end));
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());
@@ -105,11 +123,23 @@ void Task::run_cycle(const Activation& activation) noexcept {
   if (config_.between_cycles) work_between_cycles();
 }
 
+void Task::tell_start(const Activation& activation, TimePoint start) noexcept {
+  if (activation.lost_cycles > 0) {
+    flight_.put(start, FlightKind::lost, static_cast<std::int64_t>(activation.lost_cycles));
+  }
+  if (state_->event() != nullptr) {
+    flight_.put(start, FlightKind::taken, static_cast<std::int64_t>(state_->posts_done()));
+  }
+  flight_.put(start, FlightKind::start, (start - activation.release).count());
+}
+
 void Task::stand_still(const std::function<void()>& wait) noexcept {
   const TimePoint from = clock_.now();
+  flight_.put(from, FlightKind::halted);
   const TimePoint start = trap_.seat().stands_still();
   wait();
   const TimePoint to = clock_.now();
+  flight_.put(to, FlightKind::resumed);
   stood_still_ += to - from;
   // Before the seat is taken: releases of that time are not omitted.
   free_since_.store(to.time_since_epoch().count(), std::memory_order_relaxed);
@@ -124,7 +154,11 @@ void Task::pass_over(TimePoint end, Duration still) noexcept {
 void Task::work_between_cycles() noexcept {
   trap_.seat().work_begins();
   // Releases that fall due meanwhile are lost, as during a cycle.
-  if (config_.between_cycles()) ready_ = clock_.now();
+  if (config_.between_cycles()) {
+    const TimePoint end = clock_.now();
+    flight_.put(end, FlightKind::work, (end - ready_).count());
+    ready_ = end;
+  }
   free_since_.store(ready_.time_since_epoch().count(), std::memory_order_relaxed);
   trap_.seat().part_ends();
 }

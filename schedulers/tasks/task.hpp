@@ -15,6 +15,7 @@
 #include "schedulers/tasks/task_kind.hpp"
 #include "schedulers/tasks/task_recorder.hpp"
 #include "shm/base/counted_event.hpp"
+#include "shm/base/flight_ring.hpp"
 #include "shm/base/task_statistics.hpp"
 
 namespace plchost {
@@ -36,6 +37,10 @@ class Task {
   void follow(ClockFollower& follower) noexcept { state_->follow(follower); }
   /// Its cycles pass `gate`, which outlives the task. Set-up, before the first begin().
   void pass(CycleGate& gate) noexcept { gate_ = &gate; }
+  /// Its cycles are told in `ring`, whose memory outlives the task. Set-up, before the first begin().
+  void tell_in(FlightRing ring) noexcept { flight_ = ring; }
+  /// The task whose code this thread runs tells there; null: it runs none. The task's thread, real-time.
+  [[nodiscard]] static FlightRing* flight_here() noexcept;
   /// A cycle runs, with all that belongs to it, if it passes a gate. Any thread.
   [[nodiscard]] bool in_cycle() const noexcept { return trap_.seat().taken(); }
   /// Null: it follows no clock. Any context.
@@ -128,6 +133,7 @@ class Task {
   [[nodiscard]] bool reset_statistics() noexcept { return recorder_.reset(clock_.now()); }
 
  private:
+  void tell_start(const Activation& activation, TimePoint start) noexcept;
   [[nodiscard]] bool run_entry() noexcept;
   void look_at_overrun(Duration execution) noexcept;
   void work_between_cycles() noexcept;
@@ -149,7 +155,8 @@ class Task {
   std::atomic<std::uint64_t> lost_{0};  // these two: one writer, the task's thread
   std::atomic<std::uint64_t> on_time_{0};
   std::atomic<std::uint64_t> passed_{0};
-  Duration stood_still_{};  // in this cycle; the task's thread
+  Duration stood_still_{};  // these two: the task's thread, in this cycle
+  FlightRing flight_;
 };
 
 }  // namespace plchost

@@ -29,8 +29,8 @@ class TaskKindState {
   /// Set-up, while the task is parked: begins anew at `origin`. `takes_posts`: posters are told so.
   virtual void begin(TimePoint /*origin*/, bool /*takes_posts*/) noexcept {}
   virtual void cycle_begins(TimePoint /*release*/) noexcept {}
-  /// The cycle for `release` came to its end.
-  virtual void cycle_ended(TimePoint /*release*/, TimePoint /*end*/) noexcept {}
+  /// The cycle for `release` came to its end. By how much the next release was moved to follow a clock.
+  virtual Duration cycle_ended(TimePoint /*release*/, TimePoint /*end*/) noexcept { return {}; }
 
   /// The cycle that ended stood still for so long: the releases of that time are not lost; how many they are.
   virtual std::uint64_t pass_over(TimePoint /*end*/, Duration /*still*/) noexcept { return 0; }

@@ -12,8 +12,8 @@
 
 namespace plchost {
 
-/// What an entry of the flight recorder tells. `figure` is in nanoseconds unless said otherwise. The numbers
-/// are part of the page's version.
+/// The meaning of an entry of the flight recorder. `figure` is in nanoseconds unless said otherwise. The
+/// numbers are part of the page's version.
 enum class FlightKind : std::uint8_t {
   none = 0,       ///< no entry: memory that nobody has written
   start = 1,      ///< a cycle begins; figure: since its planned release

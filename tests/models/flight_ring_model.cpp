@@ -64,7 +64,7 @@ void two_readers(Scene& scene) {
   for (const char* name : {"reader", "other reader"}) scene.thread(name, [&] { read(shared, 1); });
 }
 
-// What a writer that is killed has left can be read, and is whole.
+// All entries that a killed writer has left are whole.
 void a_writer_is_killed(Scene& scene) {
   auto& shared = scene.make<Shared>();
   scene.limits({.kills = 1});

@@ -34,11 +34,13 @@ class CyclicKind final : public TaskKindState {
     set_due(origin + config_.start_offset);
   }
   void cycle_begins(TimePoint release) noexcept override { set_due(release + interval()); }
-  void cycle_ended(TimePoint release, TimePoint end) noexcept override {
+  Duration cycle_ended(TimePoint release, TimePoint end) noexcept override {
     grid_.set_interval(interval());
     grid_.ran(release);
-    if (follower_ == nullptr) return;
-    grid_.shift(follower_->correction(grid_.next(), grid_.interval(), config_.start_offset, end));
+    if (follower_ == nullptr) return {};
+    const Duration by = follower_->correction(grid_.next(), grid_.interval(), config_.start_offset, end);
+    grid_.shift(by);
+    return by;
   }
 
   std::uint64_t pass_over(TimePoint end, Duration still) noexcept override {

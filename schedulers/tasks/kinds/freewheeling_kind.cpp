@@ -14,9 +14,10 @@ class FreewheelingKind final : public TaskKindState {
   void begin(TimePoint /*origin*/, bool /*takes_posts*/) noexcept override { begun_ = false; }
   // Only here it is worth the system calls: it sleeps by what it has used itself.
   void cycle_begins(TimePoint /*release*/) noexcept override { used_before_ = clock_.thread_time(); }
-  void cycle_ended(TimePoint /*release*/, TimePoint /*end*/) noexcept override {
+  Duration cycle_ended(TimePoint /*release*/, TimePoint /*end*/) noexcept override {
     last_execution_ = clock_.thread_time() - used_before_;
     begun_ = true;
+    return {};
   }
 
   [[nodiscard]] Activation next_release(TimePoint ready, const FreewheelRule& rule) const noexcept override {
