@@ -17,6 +17,7 @@
 #include "shm/base/thread.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/outputs_page.hpp"
@@ -140,6 +141,7 @@ void Manager::remove_pages(const std::string& instance) const {
   LogRing::remove(config_.host.pool, instance);
   OutputsPage::remove(config_.host.pool, instance);
   DebugPage::remove(config_.host.pool, instance);
+  FlightPage::remove(config_.host.pool, instance);
 }
 
 }  // namespace plchost

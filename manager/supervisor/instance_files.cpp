@@ -24,6 +24,7 @@
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
 #include "shm/pages/exception_history.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/outputs_page.hpp"
 #include "shm/variables/symbol_page.hpp"
@@ -84,7 +85,7 @@ void remove_pages_of_others(const LeftFiles& left, uid_t user) {
   }
   for (const std::string& name :
        {instance_page_name(left.pool, left.instance), symbol_page_name(left.pool, left.instance),
-        debug_page_name(left.pool, left.instance)}) {
+        debug_page_name(left.pool, left.instance), flight_page_name(left.pool, left.instance)}) {
     if (of_another(name)) MemoryFile::remove(name);
   }
   if (!of_another(outputs_page_name(left.pool, left.instance))) return;

@@ -244,6 +244,25 @@ Result<std::string> Instance::make_status_page() {
   PLCHOST_TRY(host_->variables().publish(options_.launch.pool, options_.launch.name));
   PLCHOST_TRY_ASSIGN(auto transitions, TransitionRing::open(options_.launch.pool, options_.launch.name));
   transitions_.emplace(std::move(transitions));
+  PLCHOST_TRY(make_flight_recorder());
+  return {};
+}
+
+Result<void> Instance::make_flight_recorder() {
+  const LaunchOptions& launch = options_.launch;
+  FlightPage::remove(launch.pool, launch.name);  // of a process before
+  if (!application_) return {};
+  std::vector<FlightTask> tasks;
+  for (const TaskConfig& task : application_->tasks()) {
+    FlightTask told{.name = {}, .iec_priority = task.iec_priority};
+    told.name.assign(task.name);
+    const std::string& event = task.external_event;
+    if (!event.empty()) {
+      told.event_mark = event_mark(event.contains('/') ? event : event_object_name(launch.name, event));
+    }
+    tasks.push_back(told);
+  }
+  PLCHOST_TRY_ASSIGN(flight_, FlightPage::create(launch.pool, launch.name, tasks));
   return {};
 }
 
@@ -270,10 +289,15 @@ Result<std::string> Instance::make_tasks() {
       // cycle does not.
       .to_park = [this](std::size_t index) { unbind(index); },
       .halted = [this] { host_->areas().outputs().fail(); },
+      .flight = [this](std::size_t index) { return flight_->ring(kFirstTaskRing + index); },
+      .control_flight = flight_->ring(kControlRing),
+      .watch_flight = flight_->ring(kWatchRing),
+      .poll_flight = flight_->ring(kPollRing),
       .catch_faults = true,
   };
   PLCHOST_TRY_ASSIGN(tasks_,
                      TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment)));
+  losses_.emplace(*flight_, *tasks_, cores_.size() == 1);
   host_->task_table().attach(tasks_.get());
   PLCHOST_TRY(attach_debugger());
   reference_ = follow_reference(tasks_->distributed_clock(), start_.settings.scheduler.distributed_clock,
@@ -348,6 +372,7 @@ void Instance::beat() {
   if (values_) values_->beat();
   report_tick();
   if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
+  if (losses_) losses_->look(MonotonicClock::now());
   if (tasks_) tasks_->look_after_posts();
   if (tasks_) {
     for (const std::string& news : tasks_->look_after_processor()) spdlog::warn("{}", news);
@@ -380,6 +405,7 @@ void Instance::beat() {
 
 // The manager hears of state and heartbeat over the control socket as long as the page cannot tell them.
 void Instance::look_after_page() {
+  if (flight_) flight_->keep();
   if (page_->lost()) {
     if (std::exchange(page_lost_told_, true)) return;
     spdlog::warn(

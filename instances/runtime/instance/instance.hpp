@@ -21,9 +21,11 @@
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/setup/process_setup.hpp"
 #include "instances/runtime/setup/setup_reporter.hpp"
+#include "instances/runtime/tasks/loss_watch.hpp"
 #include "instances/runtime/time/reference.hpp"
 #include "schedulers/task_set.hpp"
 #include "shm/pages/debug_page.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
@@ -197,6 +199,7 @@ class Instance {
   void keep_settings();
   void notify_tasks(unsigned event);
   void look_after_page();
+  [[nodiscard]] Result<void> make_flight_recorder();
 
   Options options_;
   TimePoint begun_ = MonotonicClock::now();  // the process, within milliseconds
@@ -212,13 +215,15 @@ class Instance {
   Components components_;
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
+  std::optional<FlightPage> flight_;  // nothing: there are no tasks
   bool page_lost_told_ = false;
   TimePoint page_told_;                   // when it was told last that the page was written over
   std::uint64_t page_damages_ = 0;        // how often it was
   std::unique_ptr<Reference> reference_;  // null: none is named
   std::string clock_silence_;             // as the log has it; empty: it is followed
   LinuxClock clock_;
-  std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them
+  std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them
+  std::optional<LossWatch> losses_;
   std::unique_ptr<OnlineChange> change_;  // waits for a moment between all cycles
   TimePoint change_ends_;                 // at the latest
   std::optional<InstanceSocket> control_;

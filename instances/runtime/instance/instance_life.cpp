@@ -216,6 +216,7 @@ Result<void> Instance::shut_down() {
     InstancePage::remove(options_.launch.pool, options_.launch.name);
     SymbolPage::remove(options_.launch.pool, options_.launch.name);
     DebugPage::remove(options_.launch.pool, options_.launch.name);
+    FlightPage::remove(options_.launch.pool, options_.launch.name);
   }
   // Under a manager there will be a next process: the numbers go on, and it may need the settings.
   if (options_.launch.report_fd < 0) {
@@ -231,6 +232,7 @@ Result<void> Instance::shut_down() {
     if (host_) host_->areas().finish();  // also what these two have changed
     // Only now: until then a thread of a component may have used a task's handle.
     if (host_) host_->task_table().attach(nullptr);
+    losses_.reset();
     tasks_.reset();
     reference_.reset();
   }

@@ -96,6 +96,7 @@ class EventTable {
     std::uint32_t tasks = 0;                         // bound to it
     std::uint32_t taking = 0;                        // of these, as posters are told: will run what is posted
     const PoolEvent* bound = nullptr;                // the events that they wait on, until the process ends
+    std::atomic<std::uint32_t> mark{0};              // of `object`, for the flight recorder
     std::atomic<const PoolEvent*> event{nullptr};    // one of events; null without a pool
     std::vector<std::unique_ptr<PoolEvent>> events;  // old ones stay: a poster may be looking at one
     SharedEvent reference;                           // while it is registered or tasks are bound to it

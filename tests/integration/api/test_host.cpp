@@ -13,6 +13,7 @@
 
 #include "api/control/control_handler.hpp"
 #include "instances/launch/launch_contract.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/transition_ring.hpp"
 #include "tests/support/interrupted_write.hpp"
@@ -59,6 +60,7 @@ TestHost::~TestHost() {
   manager_ = {};
   for (const std::string& instance : instances_) {
     InstancePage::remove(pool_name_, instance);
+    FlightPage::remove(pool_name_, instance);
     TransitionRing::remove(pool_name_, instance);
     LogRing::remove(pool_name_, instance);
   }

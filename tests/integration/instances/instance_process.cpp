@@ -20,6 +20,7 @@
 #include "instances/launch/launch_contract.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/outputs_page.hpp"
 #include "shm/variables/symbol_page.hpp"
 #include "tests/support/own_name.hpp"
@@ -51,6 +52,7 @@ Sandbox::~Sandbox() {
   remove_pool_memories(pool_);
   for (const char* instance : {"line1", "line2", "line3"}) {
     InstancePage::remove(pool_, instance);
+    FlightPage::remove(pool_, instance);
     TransitionRing::remove(pool_, instance);
     SymbolPage::remove(pool_, instance);
     OutputsPage::remove(pool_, instance);

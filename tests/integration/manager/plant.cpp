@@ -12,6 +12,7 @@
 
 #include "api/control/control_handler.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/outputs_page.hpp"
 #include "shm/pages/transition_ring.hpp"
@@ -42,6 +43,7 @@ Plant::~Plant() {
   kill_instances();
   for (const std::string& name : names_) {
     InstancePage::remove(pool_, name);
+    FlightPage::remove(pool_, name);
     TransitionRing::remove(pool_, name);
     MemoryFile::remove(pool_ + ".variables." + name);
     LogRing::remove(pool_, name);
