@@ -1,7 +1,10 @@
 // The runtime's cost per cycle: the processor time of an empty task with its statistics under
 // CmpScheduleTimer. Beside it the same loop without them: a thread that reads two timerfds in turn, as the
 // scheduler's does, and calls an empty function. One sample per slice. And the same without the wait, a
-// million cycles back to back.
+// million cycles back to back. And what one entry of the flight recorder costs of that.
+
+#include <array>
+#include <vector>
 
 #include <sys/resource.h>
 
@@ -64,6 +67,48 @@ Duration time_of(Call call) {
   return (cpu() - before) / kCalls;
 }
 
+/// A ring as large as that of each of 29 tasks.
+struct RingMemory {
+  FlightRing::Word written{0};
+  std::array<FlightRing::Word, 4096 * FlightRing::kWordsOfEntry> words{};
+};
+
+/// One entry, beside the plain store of its 16 bytes into the same memory.
+Result<Row> measure_entry(const Plan& plan) {
+  constexpr int kRounds = 50;
+  Row row{.name = "cost/recorder/entry", .sample = "the mean of 20,000 entries"};
+  row.ours = Samples(kRounds);
+  row.floor = Samples(kRounds);
+  auto body = [&] {
+    const auto memory = std::make_unique<RingMemory>();
+    FlightRing ring(memory->written, memory->words);
+    struct Entry {
+      std::int64_t time;
+      std::int64_t figure;
+    };
+    std::vector<Entry> plain(memory->words.size() / FlightRing::kWordsOfEntry);
+    std::int64_t number = 0;
+    for (int round = 0; round < kRounds; ++round) {
+      row.floor.add(time_of([&] {
+        Entry* const place = &plain[static_cast<std::size_t>(++number) & (plain.size() - 1)];
+        *place = {.time = number, .figure = number};
+        asm volatile("" : : "r"(place) : "memory");
+      }));
+      row.ours.add(time_of([&] {
+        ++number;
+        ring.put(TimePoint(Duration(number)), FlightKind::start, number);
+      }));
+    }
+  };
+  const OnCore thread_inherits_it(plan.task_core);
+  PLCHOST_TRY_ASSIGN(auto thread, Thread::start("cost", kPriority, body));
+  thread.join();
+  constexpr double kNsPerUs = 1000;
+  row.targets = {{"below 50 ns of CPU", "ns", kNsPerUs * summarise(row.ours).p50, 50}};
+  row.note = "a cycle writes two: the times are those that it has read for its statistics";
+  return row;
+}
+
 /// Without the wait: Task::run_cycle of an empty task, beside calling the empty function.
 Result<Row> measure_back_to_back(const Plan& plan) {
   constexpr int kRounds = 50;
@@ -80,6 +125,8 @@ Result<Row> measure_back_to_back(const Plan& plan) {
     config.entry = [] {};
     const std::function<void()> entry = config.entry;
     Task task(clock, config, *statistics, nullptr);
+    const auto ring = std::make_unique<RingMemory>();
+    task.tell_in(FlightRing(ring->written, ring->words));
     task.begin(clock.now());
     const double before = page_faults();
     for (int round = 0; round < kRounds; ++round) {
@@ -103,7 +150,7 @@ Result<std::vector<Row>> measure_cost(const Plan& plan) {
   std::vector<Row> rows;
   for (auto row : {measure_with_wait(plan, std::chrono::milliseconds(1), "cost/cycle/1ms"),
                    measure_with_wait(plan, std::chrono::microseconds(100), "cost/cycle/100us"),
-                   measure_back_to_back(plan)}) {
+                   measure_back_to_back(plan), measure_entry(plan)}) {
     if (!row) return std::unexpected(std::move(row.error()));
     rows.push_back(std::move(*row));
   }
