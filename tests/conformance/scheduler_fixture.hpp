@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <deque>
 #include <memory>
 #include <string>
@@ -111,6 +112,10 @@ class Tasks {
       while (statistics_.size() <= index) statistics_.emplace_back();
       return statistics_[index];
     };
+    environment.flight = [this](std::size_t index) {
+      while (flights_.size() <= index) flights_.emplace_back();
+      return FlightRing(flights_[index].written, flights_[index].words);
+    };
     environment.to_park = to_park;
     environment.allow_unprivileged = unprivileged;
     environment.devices = devices;
@@ -119,6 +124,11 @@ class Tasks {
 
   std::vector<TaskConfig> configs_;
   std::deque<TaskStatistics> statistics_;
+  struct Flight {
+    FlightRing::Word written{0};
+    std::array<FlightRing::Word, 128 * FlightRing::kWordsOfEntry> words{};
+  };
+  std::deque<Flight> flights_;
   std::deque<std::pair<std::string, CountedEvent>> events_;
 
  public:
