@@ -8,7 +8,7 @@
 
 namespace plchost::dds {
 
-/// What a host says of itself to other hosts, in the user data of its participant.
+/// A host as it describes itself to other hosts, in the user data of its participant.
 struct HostMark {
   std::string_view name;      ///< of the host
   bool sends_blocks = false;  ///< it has a number for other hosts ([blocks] host_number)
@@ -19,8 +19,8 @@ struct HostMark {
 /// Nothing: they are not of a host, or of one that says more than this version knows.
 [[nodiscard]] std::optional<HostMark> host_mark_of(std::string_view words) noexcept;
 
-/// Whether two hosts have something to say to each other: who has the name that both want, or blocks. Both
-/// come to the same answer.
+/// Whether two hosts have to know of each other: they want the same name, or both send blocks. Both come to
+/// the same answer.
 [[nodiscard]] bool concern_each_other(const HostMark& one, const HostMark& other) noexcept;
 
 /// Takes the announcements of hosts that do not concern `own` out of a datagram that admit() has passed, in
