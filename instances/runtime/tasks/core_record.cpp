@@ -136,8 +136,9 @@ CoreRecord::Ended CoreRecord::ended(std::size_t task, TimePoint from, TimePoint 
   return ended;
 }
 
-// Between two borders of pieces one of those that are active has the core: what is above all tasks, then the
-// task of the highest priority. Of the same priority, the task itself: it began, and nothing pre-empts it.
+// Between two borders of pieces one of those that are active has the core: the runtime above all tasks, then
+// the task of the highest priority. Of the same priority, the task itself: it began, and nothing pre-empts
+// it.
 CoreRecord::Share CoreRecord::share(std::size_t task, TimePoint from, TimePoint to) const {
   struct Border {
     TimePoint at;

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// Who had the core when, made of the entries of the flight recorder. Pure; allocates.
+/// The holder of the core at each time, made of the entries of the flight recorder. Pure; allocates.
 class CoreRecord {
  public:
   /// The IEC priorities of the tasks. `one_core`: all threads of the instance share a core, so that one task

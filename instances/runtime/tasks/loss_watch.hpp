@@ -12,7 +12,7 @@
 namespace plchost {
 
 /// Finds the cause of each loss of cycles, and keeps it in the flight recorder's page. It runs on the control
-/// thread within 100 ms of the loss: the entries are still there then, and only this process can ask how much
+/// thread within 100 ms of the loss. The entries are still there then. Only this process can ask how much
 /// processor time its threads have used. The cycle itself pays nothing for it.
 ///
 /// A cycle that took too long may have computed, or have stood still because the machine stopped, another
