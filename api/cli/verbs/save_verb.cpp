@@ -58,6 +58,7 @@ class Report {
     add("instance", rows_of<plc_InstanceStatus>());
     add("applications", rows_of<plc_ApplicationStatus>(false));
     add("exception", rows_of<plc_ExceptionStatus>());
+    add("losses", rows_of<plc_LossStatus>());
     add("tasks", tasks());
     add("events", rows_of<plc_EventStatus>());
     add("transitions", transition_rows(session_, instance_));

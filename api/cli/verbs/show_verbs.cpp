@@ -98,6 +98,9 @@ int show_statistics(CliSession& session, const plc_TaskStatus& task) {
     identity[field] = row[field];
   }
   fmt::print("{}{}", format_fields(identity), format_statistics(report->sample(), terminal_style()));
+  if (report->sample().lost_cycles > 0) {
+    fmt::print("\nwhy cycles were lost: plcctl show losses {}\n", name_of(task));
+  }
   return kExitDone;
 }
 
@@ -106,6 +109,49 @@ int show_task(CliSession& session, const std::string& name) {
   if (!parts) return CliSession::fail(parts.error());
   const auto task = find(session, &ControlClient::tasks, "task", name);
   return task ? show_statistics(session, *task) : CliSession::fail(task.error());
+}
+
+/// The task `name` of the instance; not_found: lists those that there are.
+Result<void> check_task(CliSession& session, const std::string& host, const std::string& instance,
+                        const std::string& name) {
+  PLCHOST_TRY_ASSIGN(const auto tasks, session.client().value()->tasks(host, session.deadline()));
+  std::vector<std::string> names;
+  for (const plc_TaskStatus& task : tasks) {
+    if (dds::text_of(task.instance) != instance) continue;
+    names.emplace_back(dds::text_of(task.task));
+    if (names.back() == name) return {};
+  }
+  return unknown_name("task", name, names, host);
+}
+
+/// Of INSTANCE or INSTANCE/TASK, the oldest first.
+Result<std::vector<Row>> loss_rows(CliSession& session, const std::string& name) {
+  const auto slash = name.find('/');
+  const std::string instance = name.substr(0, slash);
+  const std::string task = slash == std::string::npos ? std::string() : name.substr(slash + 1);
+  PLCHOST_TRY_ASSIGN(const auto host, session.target_host());
+  PLCHOST_TRY(session.check_instance(instance));
+  if (slash != std::string::npos) {
+    PLCHOST_TRY(check_task(session, host, instance, task));
+  }
+  PLCHOST_TRY_ASSIGN(const auto losses,
+                     session.client().value()->status<plc_LossStatus>(host, session.deadline()));
+  std::vector<Row> rows;
+  for (const plc_LossStatus& loss : losses) {
+    if (dds::text_of(loss.instance) != instance) continue;
+    if (task.empty() || dds::text_of(loss.task) == task) rows.push_back(to_row(loss));
+  }
+  return rows;
+}
+
+int show_losses(CliSession& session, const std::string& name) {
+  const auto rows = loss_rows(session, name);
+  if (!rows) return CliSession::fail(rows.error());
+  if (!rows->empty() || session.options.json || session.options.csv) {
+    return session.show(*rows, columns_of<plc_LossStatus>());
+  }
+  fmt::print("{} has lost no cycles\n", name);
+  return kExitDone;
 }
 
 // The functions of a back-trace, each on a line with its number.
@@ -156,9 +202,10 @@ int show_exception(CliSession& session, const std::string& name) {
 }  // namespace
 
 void add_show_verbs(const Command& plcctl, CliSession& session) {
-  const Command verb = plcctl.verb(
-      "show",
-      "Show all that is known of one instance, its last exception, one task or one object, or how blocks go");
+  const Command verb = plcctl.verb("show",
+                                   "Show all that is known of one instance, its last exception or lost "
+                                   "cycles, one task or one object, or how "
+                                   "blocks go");
   const auto add = [&](const char* noun, const char* form, const char* text,
                        int (*run)(CliSession&, const std::string&)) {
     const auto name = std::make_shared<std::string>();
@@ -167,6 +214,8 @@ void add_show_verbs(const Command& plcctl, CliSession& session) {
   add("instance", "INSTANCE", "One PLC instance", show_instance);
   add("exception", "INSTANCE", "The last exception of one PLC instance", show_exception);
   add("task", "INSTANCE/TASK", "One task", show_task);
+  add("losses", "INSTANCE[/TASK]", "The last lost cycles of one PLC instance or task, and why they were lost",
+      show_losses);
   add_show_object(verb, session);
   add_show_routes(verb, session);
 }

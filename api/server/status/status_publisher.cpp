@@ -77,6 +77,7 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   publisher.writers_ = WriterWatch(of_topics.of<plc_WriterStatus>());
   publisher.applications_ =
       ApplicationWatch(source.applications_folder, of_topics.of<plc_ApplicationStatus>());
+  publisher.losses_ = LossPublisher(source.pool->name(), of_topics.of<plc_LossStatus>());
   publisher.presence_ = std::move(*presence);
   publisher.publisher_ = std::move(publisher_of_status);
   PLCHOST_TRY(publisher.page_.wait(MonotonicClock::now() + kPageWait));
@@ -131,9 +132,11 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     if (std::ranges::find(names, gone) != names.end()) continue;
     changed |= tasks_.forget(gone);
     transitions_.forget(gone);
+    changed |= losses_.forget(gone);
   }
   instance_names_ = std::move(names);
   table.write();
+  losses_.write();
   changed |= std::exchange(unsaved_, unsaved) != unsaved;
   return changed;
 }
@@ -142,6 +145,7 @@ bool StatusPublisher::update_instance(const InstanceStatus& status, TimePoint no
   const std::string name(status.name.view());
   bool changed = tasks_.follow(status, now);
   changed |= exceptions_.follow(status, tasks_, now);
+  changed |= losses_.follow(status, now);
   plc_InstanceStatus sample = tables_->of<plc_InstanceStatus>().blank();
   dds::copy_text(sample.instance, name);
   sample.state = static_cast<std::uint32_t>(status.state);

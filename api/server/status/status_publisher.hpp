@@ -15,6 +15,7 @@
 #include "api/server/status/exception_watch.hpp"
 #include "api/server/status/host_grid.hpp"
 #include "api/server/status/host_load.hpp"
+#include "api/server/status/loss_publisher.hpp"
 #include "api/server/status/status_table.hpp"
 #include "api/server/status/status_tables.hpp"
 #include "api/server/status/task_watch.hpp"
@@ -115,6 +116,7 @@ class StatusPublisher {
   StatusTable<plc_HostStatus> hosts_;
   ApplicationWatch applications_;
   WriterWatch writers_;
+  LossPublisher losses_;
   bool writers_changed_ = false;
   dds::TopicWriter presence_;
   dds::Entity publisher_;
