@@ -68,29 +68,32 @@ class ErrorReader {
   void take(const Line& line) {
     if (problems_.size() >= kMostProblems) return;
     if (line.rest.starts_with(kNeeds)) {
-      if (auto place = find_source_(line.file, line.line)) needed_by_ = std::move(place);
+      if (auto source = find_source_(line.file, line.line)) needed_by_ = std::move(source);
     } else if (line.rest.starts_with(kExpands)) {
       if (!unplaced_.empty()) add(find_source_(line.file, line.line));
     } else if (const std::string_view text = text_of_error(line.rest); !text.empty()) {
       unplaced_ = text;
-      auto place = find_source_(line.file, line.line);
-      add(place ? std::move(place) : std::move(needed_by_));
+      auto source = find_source_(line.file, line.line);
+      add(source ? std::move(source) : std::move(needed_by_));
       needed_by_.reset();
     }
   }
   [[nodiscard]] iec::SourceProblems problems() && { return std::move(problems_); }
 
  private:
-  void add(std::optional<iec::SourcePlace> place) {
-    if (!place) return;
-    iec::SourceProblem problem{*std::move(place), std::exchange(unplaced_, "")};
+  void add(std::optional<FoundSource> source) {
+    if (!source) return;
+    std::string text = std::exchange(unplaced_, "");
+    if (!source->subject.empty()) text = fmt::format("{}: {}", source->subject, text);
+    if (!source->advice.empty()) text += "; " + source->advice;
+    iec::SourceProblem problem{std::move(source->place), std::move(text)};
     if (std::ranges::find(problems_, problem) == problems_.end()) problems_.push_back(std::move(problem));
   }
 
   const FindSource& find_source_;
   iec::SourceProblems problems_;
-  std::optional<iec::SourcePlace> needed_by_;  // of the template of which an error follows
-  std::string unplaced_;                       // an error whose place may follow
+  std::optional<FoundSource> needed_by_;  // of the template of which an error follows
+  std::string unplaced_;                  // an error whose place may follow
 };
 
 bool is_of_name(char c) noexcept {

@@ -11,11 +11,18 @@
 
 namespace plchost {
 
+/// Of what a line of generated code was made.
+struct FoundSource {
+  iec::SourcePlace place;
+  std::string subject = {};  ///< "variable 'grid'"; empty: a statement
+  std::string advice = {};   ///< what to do about an error there; empty: the error says enough
+};
 /// The source of this line of a file that a compiler for C or C++ names. Nothing: it is none of a source.
-using FindSource = std::function<std::optional<iec::SourcePlace>(const std::string& file, unsigned line)>;
+using FindSource = std::function<std::optional<FoundSource>(const std::string& file, unsigned line)>;
 
 /// The errors of a compiler for C or C++ that have a place in a source. An error in a template of a header
-/// has that of the line that needs it. The columns are those of the generated code, so the places have none.
+/// has that of the line that needs it. Only declarations have a column: those that the compiler tells are of
+/// the generated code.
 [[nodiscard]] iec::SourceProblems problems_of_compiler(std::string_view output,
                                                        const FindSource& find_source);
 

@@ -11,6 +11,7 @@
 #include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/complements.hpp"
+#include "instances/adapters/matiec/declared.hpp"
 #include "instances/adapters/matiec/explained.hpp"
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
@@ -19,6 +20,7 @@
 #include "instances/adapters/matiec/loops.hpp"
 #include "instances/adapters/matiec/refused.hpp"
 #include "instances/adapters/matiec/statements.hpp"
+#include "instances/adapters/matiec/temporaries.hpp"
 #include "instances/adapters/matiec/unknown_values.hpp"
 #include "instances/adapters/translator.hpp"
 
@@ -98,13 +100,26 @@ class MatiecTranslator : public Translator {
     return context_.has(context_.folder().write(std::string(matiec::kJoinedFile), joined_->text())) && run();
   }
 
-  // Of the C that is copied from a pragma, else of the statement that a line of C is made from.
-  [[nodiscard]] std::optional<iec::SourcePlace> source_of(const std::string& file, unsigned line) const {
-    if (std::filesystem::path(file).filename() != kCode) return std::nullopt;
-    if (auto place = place_in_pragma(matiec::line_in(code_, line), context_.sources)) return place;
+  // Of the C that is copied from a pragma, else of the statement or the declaration that a line of C is made
+  // from.
+  [[nodiscard]] std::optional<FoundSource> source_of(const std::string& file, unsigned line) const {
+    const std::string name = std::filesystem::path(file).filename();
+    if (name != kCode) {
+      const auto code = context_.folder().read(name);
+      return code && !name.starts_with("plchost_") ? declaration_of(*code, line) : std::nullopt;
+    }
+    if (auto place = place_in_pragma(matiec::line_in(code_, line), context_.sources))
+      return FoundSource{*std::move(place)};
     const unsigned joined = matiec::joined_line_of(code_, line);
-    if (joined == 0) return std::nullopt;
-    return joined_->place(joined, 0);
+    if (joined != 0) return FoundSource{joined_->place(joined, 0)};
+    return declaration_of(code_, line);
+  }
+  [[nodiscard]] std::optional<FoundSource> declaration_of(const std::string& code, unsigned line) const {
+    auto found = matiec::declared_in(code, line, context_.project);
+    if (!found) return std::nullopt;
+    return FoundSource{.place = std::move(found->place),
+                       .subject = std::move(found->what),
+                       .advice = "iec2c makes this C of it: declare it in another way, or use STruC++"};
   }
 
   [[nodiscard]] const iec::Configuration& configuration() const {
@@ -184,8 +199,9 @@ class MatiecTranslator : public Translator {
   [[nodiscard]] std::optional<std::string> read_code() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return std::nullopt;
-    return matiec::with_marked_initial_values(iec::with_ended_escapes(
-        matiec::with_narrow_complements(matiec::with_first_turns(*code)), kTextMacro));
+    return matiec::with_marked_initial_values(matiec::with_temporary_values(
+        iec::with_ended_escapes(matiec::with_narrow_complements(matiec::with_first_turns(*code)), kTextMacro),
+        context_.project));
   }
 
   bool drop_directives() {

@@ -109,10 +109,10 @@ class StrucppTranslator : public Translator {
 
  private:
   // The C++ has directives #line with the names that the compiler was given.
-  [[nodiscard]] std::optional<iec::SourcePlace> source_of(const std::string& file, unsigned line) const {
+  [[nodiscard]] std::optional<FoundSource> source_of(const std::string& file, unsigned line) const {
     for (std::size_t i = 0; i < context_.sources.size(); ++i) {
       const std::string& source = context_.sources[i].file;
-      if (file == name_for_compiler(source, i)) return iec::SourcePlace{source, line, 0};
+      if (file == name_for_compiler(source, i)) return FoundSource{{source, line, 0}};
     }
     return std::nullopt;
   }
@@ -173,9 +173,10 @@ class StrucppTranslator : public Translator {
   bool write_order() {
     nlohmann::json list = nlohmann::json::array();
     const std::set<std::string> enumerations = strucpp::enumerations_in(context_.sources);
+    const strucpp::Constants constants = strucpp::constants_in(context_.sources);
     for (std::size_t i = 0; i < context_.sources.size(); ++i) {
       const iec::Source& source = context_.sources[i];
-      const strucpp::SourceText made = strucpp::text_for_strucpp(source, enumerations);
+      const strucpp::SourceText made = strucpp::text_for_strucpp(source, enumerations, constants);
       nlohmann::json places = nlohmann::json::array();
       for (const auto& [line, name, location] : made.places)
         places.push_back({{"line", line}, {"name", name}, {"location", location}});

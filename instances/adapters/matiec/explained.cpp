@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <map>
 #include <set>
 #include <string>
 #include <string_view>
@@ -71,7 +72,13 @@ void find_third_edition(const iec::Source& source, iec::SourceProblems& problems
 /// The names that iec2c does not take for those of variables.
 class WrongNames {
  public:
-  explicit WrongNames(const iec::Project& project) {
+  WrongNames(const iec::Project& project, std::span<const iec::Source> sources) {
+    for (const iec::Source& source : sources) {
+      for (const Token& token : iec::tokens_of(source.text, source.file).all) {
+        if (token.kind == Token::Kind::name)
+          words_[{source.file, position(token.place)}] = iec::folded(token.text);
+      }
+    }
     for (const iec::Pou& pou : project.pous) declared_.insert(iec::folded(pou.name));
     for (const iec::DeclaredType& type : project.types) declared_.insert(iec::folded(type.name));
     for (const iec::Pou& pou : project.pous) add(pou.variables);
@@ -88,6 +95,10 @@ class WrongNames {
     for (const iec::Variable* const one : variables_) {
       if (one->place.file != problem.place.file || position(one->place) < position(problem.place)) continue;
       if (variable == nullptr || position(one->place) < position(variable->place)) variable = one;
+    }
+    if (const auto use = words_.find({problem.place.file, position(problem.place)});
+        use != words_.end() && problem.text.starts_with("Variable not declared")) {
+      if (std::string why = why_unknown(use->second); !why.empty()) return {problem.place, std::move(why)};
     }
     if (variable == nullptr || (variable->place != problem.place && !is_at_section)) return problem;
     const std::string why = reason(iec::folded(variable->name));
@@ -107,7 +118,27 @@ class WrongNames {
     return declared_.contains(name) ? "also the name of a type or POU" : "";
   }
 
+  // iec2c declares such variables, and knows them in no statement.
+  [[nodiscard]] std::string why_unknown(const std::string& name) const {
+    for (const iec::Variable* const one : variables_) {
+      if (iec::folded(one->name) != name) continue;
+      const std::string type = iec::folded(one->type);
+      if (type.starts_with("STRING") && type.contains('['))
+        return fmt::format(
+            "'{}' is a STRING with a length, which iec2c knows in no statement; declare it "
+            "STRING",
+            one->name);
+      if (type.ends_with("R_EDGE") || type.ends_with("F_EDGE"))
+        return fmt::format(
+            "'{}' is an input with an edge, which iec2c knows in no statement; use R_TRIG or "
+            "F_TRIG",
+            one->name);
+    }
+    return "";
+  }
+
   std::set<std::string> declared_;  // types and POUs, folded
+  std::map<std::pair<std::string, std::pair<unsigned, unsigned>>, std::string> words_;  // names, folded
   std::vector<const iec::Variable*> variables_;
 };
 
@@ -115,7 +146,7 @@ class WrongNames {
 
 iec::SourceProblems explained(iec::SourceProblems problems, std::span<const iec::Source> sources,
                               const iec::Project& project) {
-  const WrongNames names(project);
+  const WrongNames names(project, sources);
   iec::SourceProblems all;
   for (const iec::Source& source : sources) find_third_edition(source, all);
   for (iec::SourceProblem& problem : problems) {

@@ -12,6 +12,7 @@
 
 #include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/iec/tokens.hpp"
+#include "instances/adapters/matiec/temporaries.hpp"
 
 namespace plchost::matiec {
 
@@ -196,12 +197,14 @@ void name_signs(const Token& token, std::string& text, SectionSplitter::Insertio
 
 TextForIec2c for_iec2c(const iec::Source& source) {
   constexpr std::string_view kAnyInterval = "T#1ms";
+  constexpr std::string_view kVar = "VAR";  // of VAR_TEMP
   std::string text = source.text;
   const iec::Tokens tokens = iec::tokens_of(text, source.file);
   for (const iec::Stretch& comment : tokens.new_comments) blank(text, comment.offset, comment.bytes);
   IntervalFinder intervals;
   SectionSplitter sections;
   BodyFinder bodies;
+  TemporarySections temporaries;
   SectionSplitter::Insertions insertions;
   for (const Token& token : tokens.all) {
     if (iec::is_of_other_tools(token)) {  // any other pragma is C for iec2c, or one of its own
@@ -211,6 +214,8 @@ TextForIec2c for_iec2c(const iec::Source& source) {
     const bool is_interval = intervals.is_interval(token);
     sections.look(token);
     bodies.look(token);
+    if (temporaries.begins_one(token))
+      blank(text, token.offset + kVar.size(), token.text.size() - kVar.size());
     if (token.kind == Token::Kind::text) {
       name_signs(token, text, insertions);
     } else if (token.kind == Token::Kind::place) {

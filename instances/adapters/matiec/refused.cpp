@@ -316,7 +316,22 @@ iec::SourceProblems refused_names(const iec::Project& project) {
 iec::SourceProblems refused_pous(const iec::Project& project, std::span<const iec::Source> sources) {
   constexpr std::array<std::string_view, 3> kKinds{"PROGRAM", "FUNCTION_BLOCK", "FUNCTION"};
   iec::SourceProblems problems;
+  const auto refuse_enumerations = [&](const std::vector<iec::Variable>& variables) {
+    for (const iec::Variable& variable : variables) {
+      if (!variable.type.starts_with('(')) continue;
+      problems.push_back(
+          {variable.place,
+           fmt::format("'{}' has an enumeration of its own, which iec2c cannot translate; give "
+                       "that a name in TYPE ... END_TYPE",
+                       variable.name)});
+    }
+  };
+  for (const iec::Configuration& configuration : project.configurations) {
+    refuse_enumerations(configuration.globals);
+    for (const iec::Resource& resource : configuration.resources) refuse_enumerations(resource.globals);
+  }
   for (const iec::Pou& pou : project.pous) {
+    refuse_enumerations(pou.variables);
     if (!pou.variables.empty()) continue;
     problems.push_back(
         {pou.name_place, fmt::format("{} {} has no variables, and iec2c cannot translate it; declare one",

@@ -10,8 +10,8 @@ namespace plchost::matiec {
 /// Names of which iec2c makes C that no compiler takes: macros of the headers that its C includes.
 [[nodiscard]] iec::SourceProblems refused_names(const iec::Project& project);
 
-/// POUs without variables, and bodies that begin with a ';'. iec2c loses its way in both, and tells errors of
-/// what follows.
+/// POUs without variables, enumerations without a name, and bodies that begin with a ';'. iec2c loses its way
+/// in them, and tells errors of what follows.
 [[nodiscard]] iec::SourceProblems refused_pous(const iec::Project& project,
                                                std::span<const iec::Source> sources);
 

@@ -86,7 +86,7 @@ class Instrumenter {
       enter(made_.pous.back());
     }
     made_.pous[*number_].lines.push_back(place.line);
-    made_.text += iec::debug_statement(place.line);
+    made_.text += fmt::format("{}{} */\n{}", kComment, joined, iec::debug_statement(place.line));
   }
 
   // The local variables of a function are those of C, which stand before. Those of others are members.

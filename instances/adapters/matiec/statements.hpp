@@ -10,7 +10,7 @@
 
 namespace plchost::matiec {
 
-/// The C code of iec2c with a PLC_STATEMENT before each statement.
+/// The C code of iec2c with a PLC_STATEMENT before each statement, and the comments of without_directives().
 struct DebugCode {
   std::string text;
   std::vector<iec::DebugPou> pous;  ///< their names in upper case, as iec2c writes them
@@ -28,7 +28,7 @@ struct DebugCode {
 [[nodiscard]] std::string_view line_in(std::string_view code, unsigned line);
 
 /// The line of the joined source of which the statement is that this line of the code belongs to. `code`: of
-/// without_directives(). 0: it belongs to none.
+/// without_directives() or with_statements(). 0: it belongs to none.
 [[nodiscard]] unsigned joined_line_of(std::string_view code, unsigned line);
 
 }  // namespace plchost::matiec

@@ -30,11 +30,20 @@ std::size_t end_of(const Token& token) {
   return token.offset + token.text.size();
 }
 
-/// Changes the text from token to token. An insertion comes last, as it moves what is behind it.
+/// Without pragmas of other tools.
+std::vector<Token> tokens_in(const iec::Source& source) {
+  std::vector<Token> tokens = iec::tokens_of(source.text, source.file).all;
+  std::erase_if(tokens, iec::is_of_other_tools);
+  return tokens;
+}
+
+/// Changes the text from token to token. Insertions come last, as they move what is behind them.
 class Rewriter {
  public:
-  Rewriter(const iec::Source& source, const std::set<std::string>& enumerations)
-      : tokens_(iec::tokens_of(source.text, source.file).all), enumerations_(enumerations) {
+  Rewriter(const iec::Source& source, const std::set<std::string>& enumerations, const Constants& constants)
+      : tokens_(iec::tokens_of(source.text, source.file).all),
+        enumerations_(enumerations),
+        constants_(constants) {
     made_.text = source.text;
     for (const Token& token : tokens_) {
       if (iec::is_of_other_tools(token)) blank(made_.text, token.offset, end_of(token));
@@ -49,10 +58,12 @@ class Rewriter {
       if (token.is("PROGRAM")) in_program_ = true;
       if (token.is("END_PROGRAM")) in_program_ = false;
       if (token.is("CONFIGURATION")) read_configuration();
+      if (token.is("VAR_EXTERNAL") && this->token(1).is("CONSTANT")) give_values();
       if (in_program_ && is_section(token)) read_section();
     }
     hide_places();
     move_resource();
+    insert();
     return std::move(made_);
   }
 
@@ -66,10 +77,14 @@ class Rewriter {
   }
 
   // Mode#busy is Mode.busy for the compiler.
+  [[nodiscard]] std::string with_dot(std::string literal) const {
+    const std::size_t sharp = literal.find('#');
+    if (sharp != std::string::npos && enumerations_.contains(folded(literal.substr(0, sharp))))
+      literal[sharp] = '.';
+    return literal;
+  }
   void name_by_dot(const Token& token) {
-    const std::size_t sharp = token.text.find('#');
-    if (sharp != std::string::npos && enumerations_.contains(folded(token.text.substr(0, sharp))))
-      made_.text[token.offset + sharp] = '.';
+    made_.text.replace(token.offset, token.text.size(), with_dot(token.text));
   }
 
   // VAR RETAIN a, b AT %QX0.1 : BOOL; ... END_VAR
@@ -82,6 +97,24 @@ class Rewriter {
       if (token().is(";")) first = &token(1);
       if (token().is("AT") && token(1).kind == Token::Kind::place && iec::place_of(token(1).text))
         places_.push_back({first, &token(), &token(1)});
+    }
+  }
+
+  // VAR_EXTERNAL CONSTANT limit : INT; END_VAR: the value is that of the global, whatever stands here. But it
+  // is also used where the compiler needs one itself.
+  void give_values() {
+    const Token* first = &token(2);  // of the declaration
+    for (next_ += 2; !at_end() && !token().is("END_VAR"); ++next_) {
+      if (!token().is(";")) continue;
+      const auto value = constants_.find(folded(first->text));
+      // Of several names each would need its own.
+      const bool needs_one =
+          std::none_of(first, &token(), [](const Token& one) { return one.is(":=") || one.is(","); });
+      if (needs_one && value != constants_.end()) {
+        insertions_.push_back(
+            {token().offset, token().place.line, token().place.column, " := " + with_dot(value->second)});
+      }
+      first = &token(1);
     }
   }
 
@@ -128,11 +161,26 @@ class Rewriter {
     const Token& name = *(head_->first + 1);
     const std::string words = fmt::format(" RESOURCE {} ON {}", name.text, head_->last->text);
     blank(made_.text, head_->first->offset, end_of(*head_->last));
-    made_.text.insert(end_of(*head_->behind), words);
-    made_.inserted.push_back({.line = head_->behind->place.line,
-                              .column = head_->behind->place.column + iec::characters_in(head_->behind->text),
-                              .characters = iec::characters_in(words)});
+    const Token& behind = *head_->behind;
+    insertions_.push_back(
+        {end_of(behind), behind.place.line, behind.place.column + iec::characters_in(behind.text), words});
   }
+  void insert() {
+    std::ranges::sort(insertions_, {}, &Insertion::offset);
+    std::size_t moved = 0;
+    for (const auto& [offset, line, column, words] : insertions_) {
+      made_.text.insert(offset + moved, words);
+      moved += words.size();
+      made_.inserted.push_back({.line = line, .column = column, .characters = iec::characters_in(words)});
+    }
+  }
+
+  struct Insertion {
+    std::size_t offset;  // in the source, as line and column
+    unsigned line;
+    unsigned column;
+    std::string words;
+  };
 
   struct Located {
     const Token* first;
@@ -147,6 +195,8 @@ class Rewriter {
 
   std::vector<Token> tokens_;
   const std::set<std::string>& enumerations_;
+  const Constants& constants_;
+  std::vector<Insertion> insertions_;
   std::size_t next_ = 0;
   bool in_program_ = false;
   std::vector<Located> places_;
@@ -165,8 +215,33 @@ std::set<std::string> enumerations_in(std::span<const iec::Source> sources) {
   return names;
 }
 
-SourceText text_for_strucpp(const iec::Source& source, const std::set<std::string>& enumerations) {
-  return Rewriter(source, enumerations).run();
+Constants constants_in(std::span<const iec::Source> sources) {
+  Constants constants;
+  for (const iec::Source& source : sources) {
+    const std::vector<Token> tokens = tokens_in(source);
+    bool in_section = false;
+    std::vector<std::string> names;  // of a declaration
+    for (std::size_t i = 0; i + 1 < tokens.size(); ++i) {
+      if (tokens[i].is("VAR_GLOBAL")) in_section = tokens[i + 1].is("CONSTANT");
+      if (tokens[i].is("END_VAR")) in_section = false;
+      if (!in_section) continue;
+      if (tokens[i].is(";") || tokens[i].is("CONSTANT")) names.clear();
+      if (tokens[i].kind == Token::Kind::name && (tokens[i + 1].is(",") || tokens[i + 1].is(":")))
+        names.push_back(folded(tokens[i].text));
+      if (!tokens[i].is(":=")) continue;
+      std::string value;
+      for (++i; i + 1 < tokens.size() && !tokens[i].is(";"); ++i)
+        value += (value.empty() ? "" : " ") + tokens[i].text;
+      for (const std::string& name : names) constants.emplace(name, value);
+      names.clear();
+    }
+  }
+  return constants;
+}
+
+SourceText text_for_strucpp(const iec::Source& source, const std::set<std::string>& enumerations,
+                            const Constants& constants) {
+  return Rewriter(source, enumerations, constants).run();
 }
 
 }  // namespace plchost::strucpp

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <set>
 #include <span>
 #include <string>
@@ -27,15 +28,21 @@ struct SourceText {
 
   std::string text;
   std::vector<HiddenPlace> places;
-  std::vector<Inserted> inserted;
+  std::vector<Inserted> inserted;  ///< in order; each column is that of the source
 };
 
 /// The enumerations that the sources declare, by their folded names.
 [[nodiscard]] std::set<std::string> enumerations_in(std::span<const iec::Source> sources);
 
-/// Replaces the words that the compiler knows in another form only: Mode#busy, VAR_GLOBAL in a RESOURCE, and
-/// places that several programs have. Pragmas of other tools become blanks.
+/// The initial values of the VAR_GLOBAL CONSTANT, in Structured Text, by their folded names.
+using Constants = std::map<std::string, std::string>;
+[[nodiscard]] Constants constants_in(std::span<const iec::Source> sources);
+
+/// Replaces the words that the compiler knows in another form only: Mode#busy, VAR_GLOBAL in a RESOURCE,
+/// VAR_EXTERNAL CONSTANT, which it wants with an initial value, and places that several programs have.
+/// Pragmas of other tools become blanks.
 [[nodiscard]] SourceText text_for_strucpp(const iec::Source& source,
-                                          const std::set<std::string>& enumerations);
+                                          const std::set<std::string>& enumerations,
+                                          const Constants& constants);
 
 }  // namespace plchost::strucpp

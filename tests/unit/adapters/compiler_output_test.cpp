@@ -14,10 +14,12 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 std::vector<std::string> told(std::string_view output) {
-  return texts(problems_of_compiler(
-      output, [](const std::string& file, unsigned line) -> std::optional<iec::SourcePlace> {
+  return texts(
+      problems_of_compiler(output, [](const std::string& file, unsigned line) -> std::optional<FoundSource> {
+        if (file == "POUS.h")
+          return FoundSource{{"main.st", line, 3}, "variable 'grid'", "declare it in another way"};
         if (file != "/line/main.st") return std::nullopt;
-        return iec::SourcePlace{"main.st", line, 0};
+        return FoundSource{{"main.st", line, 0}};
       }));
 }
 
@@ -45,6 +47,12 @@ TEST(OutputOfACompiler, HasThePlaceThatNeedsATemplateOrAMacro) {
                    "/line/main.st:8:3: note: in expansion of macro '__SET_VAR'\n"
                    "/line/main.st:9:3: note: in expansion of macro '__SET_VAR'\n"),
               ElementsAre("main.st:8: expected ')'"));
+}
+
+TEST(OutputOfACompiler, HasTheNameOfADeclarationAndWhatToDo) {
+  EXPECT_THAT(
+      told("POUS.h:5:9: error: unknown type name 'GRID'\n"),
+      ElementsAre("main.st:5:3: variable 'grid': unknown type name 'GRID'; declare it in another way"));
 }
 
 TEST(OutputOfACompiler, IsShownFromItsFirstErrorOn) {

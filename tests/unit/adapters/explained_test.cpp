@@ -51,6 +51,25 @@ TEST(RefusedByIec2c, AreSuchVariablesAlsoIfTheyComeFirst) {
   EXPECT_THAT(explained_at(5, 18, text, error), ElementsAre("a.st:5:18: " + error)) << "y is no such name";
 }
 
+TEST(RefusedByIec2c, AreVariablesThatItDeclaresAndDoesNotKnow) {
+  const std::string text =
+      "FUNCTION_BLOCK b VAR_INPUT go : BOOL R_EDGE; stop : BOOL F_EDGE; END_VAR\n"
+      "VAR s : STRING[10]; n : INT; END_VAR\n s := 'a';\n IF go OR stop THEN n := m; END_IF; "
+      "END_FUNCTION_BLOCK";
+  const std::string error = "Variable not declared in this scope.";
+  EXPECT_THAT(
+      explained_at(3, 2, text, error),
+      ElementsAre("a.st:3:2: 's' is a STRING with a length, which iec2c knows in no statement; declare it "
+                  "STRING"));
+  EXPECT_THAT(
+      explained_at(4, 5, text, error),
+      ElementsAre("a.st:4:5: 'go' is an input with an edge, which iec2c knows in no statement; use R_TRIG "
+                  "or F_TRIG"));
+  EXPECT_THAT(explained_at(4, 11, text, error), ElementsAre(HasSubstr("'stop' is an input with an edge")));
+  EXPECT_THAT(explained_at(4, 26, text, error), ElementsAre("a.st:4:26: " + error)) << "m";
+  EXPECT_THAT(explained_at(3, 2, text), ElementsAre("a.st:3:2: invalid")) << "of another error";
+}
+
 TEST(RefusedByIec2c, IsTheThirdEdition) {
   EXPECT_THAT(
       explained_at(1, 1, "INTERFACE i\nMETHOD a END_METHOD METHOD b END_METHOD\nEND_INTERFACE"),

@@ -37,7 +37,7 @@ TEST(PragmasOfOtherTools, AreNotSeenByTheCompilers) {
   const std::string blank(pragma.size(), ' ');
   EXPECT_EQ(matiec::JoinedSource(std::vector<Source>{source}).text(),
             program(blank, " AT %QX0.0", " END_VAR VAR"));
-  const auto made = strucpp::text_for_strucpp(source, {});
+  const auto made = strucpp::text_for_strucpp(source, {}, {});
   EXPECT_EQ(made.text, program(blank, "          ", ""));
   ASSERT_EQ(made.places.size(), 1U);
   EXPECT_EQ(made.places.front().name, "A");

@@ -54,6 +54,15 @@ TEST(RefusedByMatiec, ArePousWithoutVariables) {
           "a.st:4:10: FUNCTION Five has no variables, and iec2c cannot translate it; declare one"));
 }
 
+TEST(RefusedByMatiec, AreEnumerationsWithoutAName) {
+  EXPECT_THAT(
+      pous("PROGRAM Main VAR a : (red, green) := green;\n b : INT (0..5); END_VAR a := red; END_PROGRAM\n"
+           "CONFIGURATION c VAR_GLOBAL g : (on1, off1); END_VAR END_CONFIGURATION"),
+      ElementsAre(HasSubstr("a.st:3:28: 'g' has an enumeration of its own"),
+                  "a.st:1:18: 'a' has an enumeration of its own, which iec2c cannot translate; give that a "
+                  "name in TYPE ... END_TYPE"));
+}
+
 TEST(RefusedByMatiec, AreBodiesThatBeginWithoutAStatement) {
   EXPECT_THAT(
       pous("PROGRAM Main VAR a : INT; END_VAR VAR_TEMP b : INT; END_VAR\n (* none *) ; END_PROGRAM"),

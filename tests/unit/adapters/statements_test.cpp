@@ -1,5 +1,7 @@
 #include "instances/adapters/matiec/statements.hpp"
 
+#include <algorithm>
+#include <string_view>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -65,11 +67,15 @@ TEST(MatiecStatements, GetTheirMacros) {
   EXPECT_THAT(made.text, HasSubstr("PLC_STATEMENT(2u);\n  TWICE = (X * 2);\n"));
   EXPECT_THAT(made.text,
               HasSubstr("void MAIN_body__(MAIN *data__) {\n  PLC_ENTER(plchost_pou_1, data__);\n"));
-  EXPECT_THAT(made.text,
-              HasSubstr("PLC_STATEMENT(3u);\n  if (__GET_VAR(data__->GO,)) {\nPLC_STATEMENT(2u);\n"));
+  EXPECT_THAT(
+      made.text,
+      HasSubstr("PLC_STATEMENT(3u);\n  if (__GET_VAR(data__->GO,)) {\n/* line 5 */\nPLC_STATEMENT(2u);\n"));
   EXPECT_THAT(made.text, HasSubstr("void MAIN_init__(MAIN *data__, BOOL retain) {\n  __INIT_VAR"));
   EXPECT_THAT(made.text, HasSubstr("void EMPTY_body__(EMPTY *data__) {\n  return;\n"));
   EXPECT_THAT(made.text, Not(HasSubstr("#line")));
+  const std::string_view until = std::string_view(made.text).substr(0, made.text.find("  TWICE = (X * 2);"));
+  EXPECT_EQ(joined_line_of(made.text, static_cast<unsigned>(std::ranges::count(until, '\n')) + 1), 2U)
+      << "for the errors of the C compiler";
   const std::string header = iec::debug_header(made.pous);
   EXPECT_THAT(header, HasSubstr("plchost_lines_1[] = {2u, 3u};"));
   EXPECT_THAT(header, HasSubstr("\"MAIN\", \"b \\\"1\\\".st\", plchost_lines_1, 2u, 0u, 0, 0u, 0, 0u};"));

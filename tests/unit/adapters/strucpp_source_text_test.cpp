@@ -15,7 +15,7 @@ using ::testing::IsEmpty;
 
 SourceText text_of(const std::string& text) {
   const std::vector<iec::Source> sources{{"line.st", text}};
-  return text_for_strucpp(sources.front(), enumerations_in(sources));
+  return text_for_strucpp(sources.front(), enumerations_in(sources), constants_in(sources));
 }
 
 TEST(SourceTextForStrucpp, HasValuesOfEnumerationsBehindADot) {
@@ -46,6 +46,29 @@ TEST(SourceTextForStrucpp, HasTheResourcesAsTheyAreIfThereAreSeveralOrTheyHaveNo
         "CONFIGURATION c RESOURCE r ON PLC VAR_GLOBAL a : INT;", "CONFIGURATION c RESOURCE", "RESOURCE"}) {
     EXPECT_EQ(text_of(text).text, text);
     EXPECT_THAT(text_of(text).inserted, IsEmpty());
+  }
+}
+
+TEST(SourceTextForStrucpp, GivesExternalConstantsTheValueOfTheirGlobal) {
+  const std::string globals =
+      "TYPE Mode : (idle, busy); END_TYPE\nCONFIGURATION c VAR_GLOBAL CONSTANT a, b : INT := -5; m : Mode := "
+      "Mode#busy; n : INT; END_VAR VAR_GLOBAL v : INT := 7; END_VAR END_CONFIGURATION\n";
+  const SourceText made = text_of(
+      "PROGRAM p\nVAR_EXTERNAL CONSTANT A : INT; m : Mode;\n  b : INT := 1; n : INT; "
+      "v : INT; END_VAR VAR_EXTERNAL a : INT; END_VAR END_PROGRAM\n" +
+      globals);
+  EXPECT_TRUE(
+      made.text.starts_with("PROGRAM p\nVAR_EXTERNAL CONSTANT A : INT := - 5; m : Mode := Mode.busy;\n  "
+                            "b : INT := 1; n : INT; v : INT; "
+                            "END_VAR VAR_EXTERNAL a : INT; END_VAR END_PROGRAM\n"))
+      << made.text;
+  EXPECT_THAT(made.inserted, ElementsAre(FieldsAre(2U, 30U, 7U), FieldsAre(2U, 40U, 13U)));
+  for (const std::string text :
+       {"VAR_EXTERNAL CONSTANT",
+        "VAR_EXTERNAL CONSTANT a, b : INT; END_VAR VAR_GLOBAL CONSTANT a, b : INT := 5; END_VAR",
+        "VAR_EXTERNAL CONSTANT a : INT", "VAR_GLOBAL CONSTANT a :=", "VAR_GLOBAL CONSTANT ,, : ;:= ;",
+        "VAR_EXTERNAL CONSTANT ; END_VAR"}) {
+    EXPECT_EQ(text_of(text).text, text);
   }
 }
 
