@@ -15,7 +15,7 @@ namespace plchost {
 struct FoundSource {
   iec::SourcePlace place;
   std::string subject = {};  ///< "variable 'grid'"; empty: a statement
-  std::string advice = {};   ///< what to do about an error there; empty: the error says enough
+  std::string advice = {};   ///< the way around an error there; empty: the error says enough
 };
 /// The source of this line of a file that a compiler for C or C++ names. Nothing: it is none of a source.
 using FindSource = std::function<std::optional<FoundSource>(const std::string& file, unsigned line)>;

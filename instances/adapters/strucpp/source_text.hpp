@@ -39,7 +39,8 @@ using Constants = std::map<std::string, std::string>;
 [[nodiscard]] Constants constants_in(std::span<const iec::Source> sources);
 
 /// Replaces the words that the compiler knows in another form only: Mode#busy, VAR_GLOBAL in a RESOURCE,
-/// VAR_EXTERNAL CONSTANT, which it wants with an initial value, and places that several programs have.
+/// and places that several programs have. VAR_EXTERNAL CONSTANT gets an initial value, without which it is
+/// refused.
 /// Pragmas of other tools become blanks.
 [[nodiscard]] SourceText text_for_strucpp(const iec::Source& source,
                                           const std::set<std::string>& enumerations,
