@@ -7,7 +7,7 @@ namespace plchost {
 
 namespace {
 
-constexpr std::int64_t kKinds = 256;  // FlightKind::fault: the task is the rest of its figure
+constexpr std::int64_t kFaultKinds = 256;  // FlightKind::fault: the task is the rest of its figure
 
 TimePoint time_of(const FlightEntry& entry) noexcept {
   return TimePoint(Duration(entry.time_ns));
@@ -42,7 +42,7 @@ void CoreRecord::add_control(std::span<const FlightEntry> entries) {
     if (entry.kind == FlightKind::held) above_all_.push_back({time - lasted, time, Part::online_change});
     if (entry.kind == FlightKind::started) starts_.push_back(time);
     if (entry.kind == FlightKind::fault && entry.figure >= 0) {
-      faults_.push_back({static_cast<std::size_t>(entry.figure / kKinds), time});
+      faults_.push_back({static_cast<std::size_t>(entry.figure / kFaultKinds), time});
     }
   }
 }
