@@ -161,8 +161,8 @@ void plc_semaphore_close(plc_semaphore* semaphore);
 /* ---- Mutexes ---------------------------------------------------------------------------------------------
  */
 
-/* Belongs to the thread that locked it, which inherits the priority of its waiters. If the thread or its
- * process ends, the next one gets it and is told. */
+/* Belongs to the thread that locked it, which inherits the priority of its waiters (not in a pool across
+ * containers). If the thread or its process ends, the next one gets it and is told. */
 int plc_mutex_create(plc_pool* pool, const char* name, const plc_object_options* options, plc_mutex** mutex);
 int plc_mutex_open(plc_pool* pool, const char* name, plc_mutex** mutex);
 /* PLC_POOL_OK or PLC_POOL_OWNER_DIED: locked. Any; the first lock of a thread reads a file. */

@@ -30,7 +30,7 @@ struct HostConfig {
   std::string pool = "plchost";
   std::uint32_t pool_objects = 4096;
   bool pool_across_containers = false;  ///< its users may be in several PID namespaces
-  std::string pool_owner;   ///< user's name or number; empty: the user that starts the manager
+  std::string pool_owner;               ///< user's name or number; empty: the user that starts the manager
   std::string pool_group;   ///< group's name or number; empty: that of the user that starts the manager
   mode_t pool_mode = 0660;  ///< permission bits of the pool and, where nothing else is said, of its memories
   std::string

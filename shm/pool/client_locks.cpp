@@ -107,7 +107,13 @@ Result<void> ClientLocks::renew_rights(const std::string& pool, const MemoryRigh
   const auto held = pools.lock();
   const auto status = look_at_file(path);
   const auto locks = status ? pools.find(status->st_dev, status->st_ino) : nullptr;
-  return locks ? give_rights(locks->fd_, rights_of_locks(rights), path) : Result<void>();
+  if (!locks) return {};
+  const MemoryRights wanted = rights_of_locks(rights);
+  constexpr mode_t kPermissions = 07777;
+  const bool has = status->st_uid == wanted.owner.value_or(status->st_uid) &&
+                   status->st_gid == wanted.group.value_or(status->st_gid) &&
+                   (status->st_mode & kPermissions) == wanted.mode;
+  return has ? Result<void>() : give_rights(locks->fd_, wanted, path);
 }
 
 ClientLocks::~ClientLocks() {
@@ -164,10 +170,11 @@ Result<void> ClientLocks::renew(std::atomic<std::uint32_t>& numbers) noexcept {
   return failure(ErrorCode::system, fmt::format("cannot lock a byte of {}", path_), errno);
 }
 
-// Asked as the owner of an open file, so that the kernel also tells a lock of this process.
+// Asked as the owner of an open file, so that the kernel also tells a lock of this process. A program that
+// closes what it has not opened may have another file there: in doubt the client lives, until renew().
 bool ClientLocks::lives(std::uint32_t client) const noexcept {
   struct flock lock = byte_of(client);
-  return ::fcntl(fd_, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK;
+  return ::fcntl(fd_, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK || !is_open();
 }
 
 pid_t ClientLocks::seen_as(std::uint32_t client) const noexcept {

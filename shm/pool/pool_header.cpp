@@ -86,9 +86,9 @@ Result<void> check_pid_namespace(const PoolHeader& header, const std::string& na
       ErrorCode::refused,
       fmt::format(
           "pool '{}' was made in PID namespace {}, this process is in {}: it is not for several containers. "
-          "Set [host] pool_across_containers = true for the next start of the manager. Or start this process "
-          "in the namespace of the others (of a container: --pid=host), or remove {} if nobody uses it any "
-          "more",
+          "Start this process in the namespace of the others (of a container: --pid=host). Or set [host] "
+          "pool_across_containers = true, stop the manager and all programs that use the pool, remove {} and "
+          "start the manager",
           name, theirs, ours, MemoryFile::path(name)));
 }
 

@@ -9,33 +9,17 @@ namespace {
 
 /// How many mutexes of pools across containers the thread holds. The processes that wait for them cannot see
 /// its end.
-class HeldMutexes {
- public:
-  HeldMutexes() noexcept = default;
-  ~HeldMutexes() {
-    if (count_ > 0) ProcessPools::of_this_process().abandon_mutexes();
-  }
-  HeldMutexes(const HeldMutexes&) = delete;
-  HeldMutexes& operator=(const HeldMutexes&) = delete;
+thread_local std::uint32_t held_by_thread = 0;
 
-  void add(LockResult result) noexcept {
-    if (result == LockResult::locked || result == LockResult::owner_died) ++count_;
-  }
-  void remove() noexcept {
-    if (count_ > 0) --count_;
-  }
-  void forget() noexcept { count_ = 0; }
-
- private:
-  std::uint32_t count_ = 0;
-};
-
-thread_local HeldMutexes held;
+void note(LockResult result) noexcept {
+  if (result != LockResult::locked && result != LockResult::owner_died) return;
+  if (++held_by_thread == 1) ProcessPools::of_this_process().watch_thread(held_by_thread);
+}
 
 }  // namespace
 
 void PoolMutex::forget_held() noexcept {
-  held.forget();
+  held_by_thread = 0;
 }
 
 ClientThread PoolMutex::self() const noexcept {
@@ -46,7 +30,7 @@ LockResult PoolMutex::lock_across(TimePoint deadline) noexcept {
   const ClientThread caller = self();
   if (caller.client == 0) return LockResult::corrupt;
   const LockResult result = across(*place_).lock(caller, *locks_, deadline);
-  held.add(result);
+  note(result);
   return result;
 }
 
@@ -54,13 +38,13 @@ LockResult PoolMutex::try_lock_across() noexcept {
   const ClientThread caller = self();
   if (caller.client == 0) return LockResult::corrupt;
   const LockResult result = across(*place_).try_lock(caller);
-  held.add(result);
+  note(result);
   return result;
 }
 
 bool PoolMutex::unlock_across() noexcept {
   const bool done = across(*place_).unlock(self());
-  if (done) held.remove();
+  if (done && held_by_thread > 0) --held_by_thread;
   return done;
 }
 

@@ -27,7 +27,7 @@ class PoolMutex {
   /// In a child of fork(): its thread holds nothing of what its parent held.
   static void forget_held() noexcept;
 
-  // Any context. In a pool across containers the first lock of a thread allocates.
+  // Any context.
 
   [[nodiscard]] LockResult lock(TimePoint deadline) noexcept {
     return locks_ == nullptr ? place_->lock(deadline) : lock_across(deadline);

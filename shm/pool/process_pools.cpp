@@ -17,6 +17,9 @@ ProcessPools& ProcessPools::of_this_process() {
 ProcessPools::ProcessPools() {
   static ProcessPools* self = nullptr;
   self = this;
+  (void)::pthread_key_create(&thread_end_, [](void* held) {
+    if (*static_cast<std::uint32_t*>(held) > 0) self->abandon_mutexes();
+  });
   (void)::pthread_atfork([] { self->mutex_.lock(); }, [] { self->mutex_.unlock(); },
                          [] {
                            for (const auto& file : self->files_) file->number_ = 0;

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
+
+#include <pthread.h>
 
 #include "shm/pool/client_locks.hpp"
 #include "shm/pool/pool_view.hpp"
@@ -29,6 +32,9 @@ class ProcessPools {
 
   void add(const PoolView& pool, ClientLocks& locks);
   void remove(const PoolView& pool);
+  /// Any context: from now on the end of the calling thread is seen. `held`: of that thread, so many mutexes
+  /// it holds.
+  void watch_thread(std::uint32_t& held) noexcept { (void)::pthread_setspecific(thread_end_, &held); }
   /// The calling thread ends: mutexes that it holds in these pools are abandoned. Looks at all objects.
   void abandon_mutexes() noexcept;
 
@@ -38,6 +44,7 @@ class ProcessPools {
     ClientLocks* locks;
   };
   ProcessPools();
+  pthread_key_t thread_end_{};  ///< one of the first of a process, so that its use allocates nothing
   std::mutex mutex_;
   std::vector<std::shared_ptr<ClientLocks>> files_;
   std::vector<Used> pools_;

@@ -79,7 +79,7 @@ git grep -nE '\bdlopen\(' -- "${sources[@]/%//*.[ch]pp}" ':!shm/process/dynamic_
 # One header opens, makes and checks pages. These are no pages of ours: the pool, whose magic is an atomic, and files that it may
 # adopt. Nor are retained variables in a memory of the pool or in a file, packets with values, and a clock that programs in C make.
 git grep -nE '\w(\.|->)magic\b(\.(load|store)\(| *(==|!=|=[^=])|, __ATOMIC)' -- "${sources[@]/%//*.[ch]pp}" ':!shm/files/fixed_page.hpp' \
-  ':!shm/pool/pool_'{segment,adoption}.cpp ':!instances/runtime/memory/retain_'{memory,image}.cpp ':!shm/variables/value_message.cpp' \
+  ':!shm/pool/pool_'{segment,header,adoption}.cpp ':!instances/runtime/memory/retain_'{memory,image}.cpp ':!shm/variables/value_message.cpp' \
   ':!shm/pages/reference_clock.cpp' && fault "the lines above check or make a page: use shm/files/fixed_page.hpp" || true
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
