@@ -19,13 +19,13 @@ bool holds(const Elf64_Sym& symbol, std::uint64_t address) noexcept {
 
 std::vector<std::optional<ElfFunction>> functions_at(const ElfFile& file,
                                                      std::span<const std::uint64_t> addresses) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20;
+  constexpr std::uint64_t kMostSymbolBytes = std::uint64_t{64} << 20;
   constexpr std::size_t kAtOnce = 2048 * sizeof(Elf64_Sym);
   std::vector<std::optional<ElfFunction>> found(addresses.size());
   const auto* const symbols = file.find(std::uint32_t{SHT_SYMTAB});
   const auto* const names = symbols != nullptr ? file.at(symbols->link) : nullptr;
   if (names == nullptr) return found;
-  for (std::uint64_t from = 0; from < std::min(symbols->size, kMostBytes); from += kAtOnce) {
+  for (std::uint64_t from = 0; from < std::min(symbols->size, kMostSymbolBytes); from += kAtOnce) {
     const auto part = file.read(*symbols, from, kAtOnce);
     for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(part, i); ++i) {
       for (std::size_t place = 0; place < addresses.size(); ++place) {
