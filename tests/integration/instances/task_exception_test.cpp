@@ -127,9 +127,9 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"throw", "Throw", "cpp_exception", "", "std::runtime_error left its cycle: the valve is stuck",
               "setup(plc::Application&)"},
         Fault{"throw_deep", "ThrowDeep", "cpp_exception", "", "std::runtime_error left its cycle: deep",
-              "throw_deep(int)+0x"},
+              "throw_deep(int)"},
         Fault{"variable_throws", "Edge", "cpp_exception", "",
-              "std::runtime_error left its event variable: deep", "throw_deep(int)+0x"},
+              "std::runtime_error left its event variable: deep", "throw_deep(int)"},
         Fault{"loop", "Loop", "task_watchdog", "", "the limit is 20.000 ms", "loop()+0x"},
         Fault{"sleep", "Sleep", "task_watchdog", "", "the limit is 20.000 ms", ""},
         Fault{"variable", "Edge", "signal", "SIGFPE",
@@ -176,13 +176,11 @@ const std::vector<Trace> kTraces = {
     {"variable", {"divide()+0x", "setup(plc::Application&)"}, ""},
     {"call_null", {"call_null()+0x"}, ""},
     {"throw", {"setup(plc::Application&)"}, ""},
-    {"throw_deep",
-     {"throw_deep(int)+0x", "throw_deep(int)+0x", "throw_deep(int)+0x", "throw_after_a_catch()+0x"},
-     ""},
+    {"throw_deep", {"throw_deep(int)", "throw_deep(int)", "throw_deep(int)", "throw_after_a_catch()+0x"}, ""},
     {"throw_again", {"throw_again()"}, ""},
-    {"throw_many_times", std::vector<std::string>(32, "throw_deep(int)+0x"),
+    {"throw_many_times", std::vector<std::string>(32, "throw_deep(int)"),
      "only the innermost 32 functions are known"},
-    {"variable_throws", {"throw_deep(int)+0x", "throw_deep(int)+0x", "setup(plc::Application&)"}, ""},
+    {"variable_throws", {"throw_deep(int)", "throw_deep(int)", "setup(plc::Application&)"}, ""},
 #if defined(__x86_64__)  // which has return addresses on the stack only
     {"smash_stack",
      {"smash_stack()+0x"},
@@ -200,7 +198,7 @@ TEST(TaskException, TellsFileAndLineOfEachFunctionWithDebugInformation) {
   const ExceptionEntry found = sut.exceptions().front();
   EXPECT_THAT(found.symbol,
               ::testing::ContainsRegex(
-                  R"(throw_deep\(int\)\+0x[0-9a-f]+ in task_faults.so at task_faults.cpp:[0-9]+$)"));
+                  R"(throw_deep\(int\).*\+0x[0-9a-f]+ in task_faults.so at task_faults.cpp:[0-9]+$)"));
   std::vector<std::string> lines;
   for (const std::string& function : found.back_trace) {
     if (function.find("throw_deep(int)") != std::string::npos)
