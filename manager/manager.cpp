@@ -350,7 +350,7 @@ void Manager::tick() {
   if (latency_due_) restore_latency();
   if (++ticks_ % kTicksPerTidying == 0) {
     look_after_pool();
-    keep_exceptions();
+    keep_exceptions(MonotonicClock::now());
   }
   tick_.set(MonotonicClock::now() + kTick);
 }
@@ -425,14 +425,14 @@ void Manager::shut_down() {
   });
 }
 
-void Manager::keep_exceptions() {
+void Manager::keep_exceptions(TimePoint now) {
   for (std::size_t i = 0; i < supervisor_->size(); ++i)
-    exceptions_.look(supervisor_->instance(i).config().name, MonotonicClock::now());
+    exceptions_.look(supervisor_->instance(i).config().name, now);
 }
 
 // The end of this manager: all that the next one is to know is on the disk, or cannot be.
 void Manager::when_kept(std::function<void()> done) {
-  keep_exceptions();
+  keep_exceptions(TimePoint::max());  // also those that wait to be tried again
   all_kept_ = std::move(done);
   supervisor_->when_kept([this] {
     exceptions_limit_ = MonotonicClock::now() + kExceptionLimit;
@@ -440,9 +440,11 @@ void Manager::when_kept(std::function<void()> done) {
   });
 }
 
+// An order that was under way has what there was when it began: so once more behind it.
 void Manager::await_exceptions() {
   constexpr Duration kAgain = std::chrono::milliseconds(5);
   const TimePoint now = MonotonicClock::now();
+  if (!exceptions_.is_writing() && !std::exchange(looked_again_, true)) keep_exceptions(TimePoint::max());
   if (!exceptions_.is_writing() || now >= exceptions_limit_) return all_kept_();
   exceptions_wait_.set(now + kAgain);
 }

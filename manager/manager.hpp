@@ -90,7 +90,7 @@ class Manager : private InstanceObserver {
   void clean_up();
   void tick();
   void look_after_pool();
-  void keep_exceptions();
+  void keep_exceptions(TimePoint now);
   void when_kept(std::function<void()> done);
   void await_exceptions();
   void restore_latency();
@@ -114,6 +114,7 @@ class Manager : private InstanceObserver {
   ExceptionKeeper exceptions_;
   Reactor::Timer exceptions_wait_;
   TimePoint exceptions_limit_;
+  bool looked_again_ = false;  // at the end, behind the orders that were under way
   std::function<void()> all_kept_;
   std::map<std::string, WishStore*> wishes_;  // by instance; the supervisor's
   std::vector<InstanceConfig> gone_;          // removed and ended; retain variables not yet saved

@@ -1,12 +1,16 @@
 #include "manager/store/exception_folder.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "shm/files/replace_file.hpp"
 #include "shm/log/log.hpp"
@@ -44,7 +48,9 @@ std::string kept_exceptions_path(std::string_view folder, std::string_view insta
 }
 
 Result<void> keep_exceptions_on_disk(const std::string& path, const std::string& from) {
-  PLCHOST_TRY_ASSIGN(const auto found, read_exceptions(from));
+  PLCHOST_TRY_ASSIGN(auto found, read_exceptions(from));
+  // Without a time each would be a new one, again and again.
+  std::erase_if(found.entries, [](const ExceptionEntry& entry) { return entry.unix_ns == 0; });
   if (found.entries.empty()) return {};
   auto kept = read_exceptions(path);
   if (!kept && kept.error().code != ErrorCode::corrupt) return std::unexpected(kept.error());
@@ -59,11 +65,19 @@ Result<void> keep_exceptions_on_disk(const std::string& path, const std::string&
   return sync_directory(folder);
 }
 
+// The disk may have answered late: then the instance runs, and what it has written in between stays. Its own
+// temporary file is another one.
 Result<void> restore_exceptions(const std::string& path, const std::string& to) {
-  struct stat status{};
-  if (::lstat(to.c_str(), &status) == 0) return {};
   PLCHOST_TRY_ASSIGN(const auto kept, read_exceptions(path));
-  return kept.entries.empty() ? Result<void>() : write_exceptions(to, kept);
+  if (kept.entries.empty()) return {};
+  const std::string fresh = to + ".kept";
+  PLCHOST_TRY(write_exceptions(fresh, kept));
+  const bool renamed = ::renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0;
+  const int error = errno;
+  if (renamed) return {};
+  ::unlink(fresh.c_str());
+  if (error == EEXIST) return {};
+  return failure(ErrorCode::system, "cannot rename " + fresh, error);
 }
 
 }  // namespace plchost

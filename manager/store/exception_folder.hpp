@@ -23,7 +23,8 @@ inline constexpr std::size_t kMostExceptionFiles = 128;
 [[nodiscard]] Result<void> keep_exceptions_on_disk(const std::string& path, const std::string& from);
 
 /// Puts what the disk has into the file `to` of the run directory, if that is not there: a power cut empties
-/// that folder. May wait for the disk.
+/// that folder. One that appears while the disk is read stays as it is. system: the run directory does not
+/// take it. May wait for the disk.
 [[nodiscard]] Result<void> restore_exceptions(const std::string& path, const std::string& to);
 
 }  // namespace plchost

@@ -15,10 +15,10 @@ struct FileVersion {
   std::int64_t changed_ns = 0;
   bool operator==(const FileVersion&) const = default;
 
-  /// Set-up.
+  /// Follows no link: another user may have put one there. Set-up.
   [[nodiscard]] static FileVersion of(const std::string& path) noexcept {
     struct stat status{};
-    if (::stat(path.c_str(), &status) != 0) return {};
+    if (::lstat(path.c_str(), &status) != 0) return {};
     constexpr std::int64_t kPerSecond = 1'000'000'000;
     return {.inode = status.st_ino,
             .size = status.st_size,

@@ -21,6 +21,8 @@ using Json = nlohmann::json;
 
 constexpr int kVersion = 1;
 constexpr std::size_t kMaxFile = std::size_t{256} << 10;
+// More than any instance has in its life; counted on, a greater one would begin at 0 again.
+constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 48;
 constexpr std::string_view kUntold = "only its process knew it, and could not tell it any more";
 
 Json to_json(const ExceptionEntry& entry) {
@@ -87,6 +89,17 @@ bool tells_less(const ExceptionEntry& entry, const ExceptionEntry& known) {
          (entry.back_trace.empty() && !known.back_trace.empty());
 }
 
+// The manager, and an instance of a version before, do not know them.
+void take_circumstances(ExceptionEntry& entry, const ExceptionEntry& known) {
+  if (!entry.version.empty() || known.version.empty()) return;
+  entry.version = known.version;
+  entry.build = known.build;
+  entry.scheduler = known.scheduler;
+  entry.settings = known.settings;
+  entry.cycles = known.cycles;
+  entry.uptime_ns = known.uptime_ns;
+}
+
 // Whether it was there and made room for newer ones. If the oldest one that is kept lies in the future, the
 // clock was set back: then times say nothing.
 bool was_dropped(const ExceptionHistory& history, const ExceptionEntry& entry) {
@@ -128,6 +141,7 @@ void ExceptionHistory::add(ExceptionEntry entry) {
   if (known != entries.end()) {
     if (tells_less(entry, *known)) return;
     entry.number = known->number;
+    take_circumstances(entry, *known);
     *known = std::move(entry);
     return;
   }
@@ -205,7 +219,9 @@ Result<ExceptionHistory> read_exceptions(const std::string& path) {
     for (const Json& entry : json.value("exceptions", Json::array())) {
       if (history.entries.size() == ExceptionHistory::kMaxEntries) break;
       history.entries.push_back(from_json(entry));
+      if (history.entries.back().number > kMaxCount) return corrupt(path, "has a number that is too great");
     }
+    if (history.count > kMaxCount) return corrupt(path, "has a count that is too great");
     return history;
   } catch (const Json::exception& error) {
     return corrupt(path, error.what());

@@ -155,6 +155,36 @@ TEST_F(OnABadDisk, ExceptionsAreRefusedWithTheDisksErrorAndKeptWhenItIsWell) {
   EXPECT_EQ(read_exceptions(file)->entries.back().task, "Second");
 }
 
+TEST_F(OnABadDisk, ExceptionsOfTheDiskReplaceNoneThatTheInstanceHasWritten) {
+  const std::string written = root_ / "line1.exception";  // of the run directory
+  const std::string file = kept_exceptions_path(exceptions_folder(top_.string(), "cell"), "line1");
+  ExceptionEntry entry;
+  entry.unix_ns = 1;
+  entry.task = "Fill";
+  ASSERT_TRUE(keep_exceptions(written, std::span(&entry, 1)));
+  ASSERT_TRUE(keep_exceptions_on_disk(file, written));
+  fs::remove(written);
+  const auto restored = restore_exceptions(file, written);
+  ASSERT_TRUE(restored) << restored.error().describe();
+  EXPECT_EQ(read_exceptions(written), read_exceptions(file));
+  fs::remove(written);
+  entry.task = "Label";
+  ASSERT_TRUE(keep_exceptions(written, std::span(&entry, 1)));
+  EXPECT_TRUE(restore_exceptions(file, written));
+  EXPECT_EQ(read_exceptions(written)->entries.back().task, "Label");
+  for (const auto& left : fs::directory_iterator(root_)) EXPECT_NE(left.path().extension(), ".kept");
+}
+
+TEST_F(OnABadDisk, ExceptionsWithoutATimeAreNotKeptOnTheDisk) {
+  const std::string written = root_ / "line1.exception";
+  const std::string file = kept_exceptions_path(exceptions_folder(top_.string(), "cell"), "line1");
+  ExceptionHistory history;
+  history.add({});
+  ASSERT_TRUE(write_exceptions(written, history));
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(keep_exceptions_on_disk(file, written));
+  EXPECT_FALSE(fs::exists(file));
+}
+
 // Those of instances that the configuration does not have any more stay as long as there is room.
 TEST_F(OnABadDisk, ExceptionsOfTheInstancesThatWereWrittenLastStay) {
   const std::string written = root_ / "line1.exception";

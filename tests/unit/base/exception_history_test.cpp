@@ -128,6 +128,32 @@ TEST_F(ExceptionHistoryTest, IsReadWithoutBackTraces) {
   EXPECT_TRUE(history->entries[0].back_trace.empty());
 }
 
+// The manager knows them not, nor does an instance of a version before.
+TEST_F(ExceptionHistoryTest, KeepsTheCircumstancesThatAnotherFinderDoesNotKnow) {
+  ExceptionHistory sut;
+  ExceptionEntry fault = entry("abort");
+  fault.unix_ns = 1000;
+  sut.add(fault);
+  ExceptionEntry poorer = fault;
+  poorer.symbol = "fill()+0x12";
+  poorer.version = poorer.build = poorer.scheduler = poorer.settings = "";
+  poorer.cycles = 0;
+  poorer.uptime_ns = 0;
+  sut.add(poorer);
+  fault.number = 1;
+  fault.symbol = "fill()+0x12";
+  ASSERT_EQ(sut.entries.size(), 1U);
+  EXPECT_EQ(sut.entries[0], fault);
+}
+
+// Counted on, they would begin at 0 again.
+TEST_F(ExceptionHistoryTest, IsNotReadWithNumbersThatNoInstanceReaches) {
+  write(R"({"version":1,"count":18446744073709551615,"exceptions":[]})");
+  EXPECT_EQ(read_exceptions(path_).error().code, ErrorCode::corrupt);
+  write(R"({"version":1,"count":1,"exceptions":[{"number":18446744073709551615,"task":"Fill"}]})");
+  EXPECT_EQ(read_exceptions(path_).error().code, ErrorCode::corrupt);
+}
+
 TEST_F(ExceptionHistoryTest, KeepsTheLastSixteenAndCountsAll) {
   ExceptionHistory sut;
   for (int i = 0; i < 20; ++i) sut.add(entry("x"));
