@@ -1,11 +1,13 @@
 #include "api/cli/verbs/audit_tail.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <ranges>
+#include <string_view>
 #include <utility>
 
 #include "api/audit/audit_file.hpp"
@@ -30,10 +32,34 @@ Result<std::vector<std::string>> last_lines(const std::string& path, std::uint64
   return lines;
 }
 
-// The value may be of the plant, and the text tells the one before.
+// Operations without a value of the plant, and records of the log itself.
+constexpr std::array<std::string_view, 22> kWithoutValues{"start",
+                                                          "stop",
+                                                          "reset",
+                                                          "restart",
+                                                          "single cycle",
+                                                          "reset cold",
+                                                          "reset statistics",
+                                                          "check host",
+                                                          "list objects",
+                                                          "list nodes",
+                                                          "list routes",
+                                                          "read clock",
+                                                          "load application",
+                                                          "set scheduler",
+                                                          "register event",
+                                                          "unregister event",
+                                                          "download application",
+                                                          "rollback application",
+                                                          "post",
+                                                          "begin",
+                                                          "repair",
+                                                          "gap"};
+
+// Of all others the argument may have one behind its name, and the text tells the one before.
 void leave_out_value(Row& record) {
   const std::string what = record.value("what", std::string());
-  if (!what.contains("variable")) return;
+  if (std::ranges::find(kWithoutValues, what) != kWithoutValues.end()) return;
   if (record["argument"].is_string()) {
     const auto argument = record["argument"].get<std::string>();
     record["argument"] = argument.substr(0, argument.find('='));

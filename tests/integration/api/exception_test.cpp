@@ -261,6 +261,8 @@ TEST_F(ExceptionOfAnInstance, IsInAReportThatTellsNoSecret) {
       << R"({"n":1,"who":"anna","what":"write variable","on":"line1","argument":"Pin=swordfish","text":"swordfish before"})"
       << "\n"
       << R"({"n":2,"who":"anna","what":"stop","on":"line1","argument":"","text":""})" << "\n"
+      << R"({"n":2,"who":"anna","what":"debug","on":"line1","argument":"local Fill 0 Pin=swordfish","text":"swordfish"})"
+      << "\n"
       << R"({"n":3,"who":"anna","what":"stop","on":"line2","argument":"","text":"swordfish"})" << "\n{torn";
   const std::string file = path() + ".report.json";
   const auto saved = run({"--timeout", "2", "save", "report", "line1", file, "--audit", audit});
@@ -271,9 +273,10 @@ TEST_F(ExceptionOfAnInstance, IsInAReportThatTellsNoSecret) {
   for (const char* const secret : {"swordfish", "PRIVATE", "Password"})
     EXPECT_THAT(text, Not(HasSubstr(secret)));
   const auto records = nlohmann::json::parse(text)["audit"];
-  ASSERT_EQ(records.size(), 2U);
+  ASSERT_EQ(records.size(), 3U);
   EXPECT_EQ(records[0]["argument"], "Pin");
   EXPECT_EQ(records[1]["what"], "stop");
+  EXPECT_EQ(records[2]["argument"], "local Fill 0 Pin");
   const auto refused = run({"--timeout", "2", "save", "report", "line1", file, "--audit", audit + "/none"});
   EXPECT_THAT(refused.output + refused.errors, HasSubstr("has not all: audit: "));
   fs::remove(file);
