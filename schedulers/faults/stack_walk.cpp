@@ -20,6 +20,7 @@ struct Walk {
   std::uintptr_t bottom;  // of the stack of the code
   std::uintptr_t stack = 0;
   bool begun = false;
+  bool thrown = false;  // the function that throws was met
 };
 
 // Where a fault of the walk ends it; null: this thread is in none.
@@ -105,6 +106,7 @@ bool throws(_Unwind_Context* function) noexcept {
 _Unwind_Reason_Code on_thrower(_Unwind_Context* function, void* argument) {
   Walk& walk = *static_cast<Walk*>(argument);
   if (throws(function)) {
+    walk.thrown = true;
     walk.trace->count = 0;
     return _URC_NO_REASON;
   }
@@ -149,6 +151,8 @@ void StackWalk::walk_throw(BackTrace& into, std::uintptr_t bottom) noexcept {
   into.end = BackTrace::End::lost;
   Walk walk{.trace = &into, .first = 0, .bottom = bottom};
   _Unwind_Backtrace(on_thrower, &walk);
+  // An application that has its own functions for it: nothing tells which are those of the search.
+  if (!walk.thrown) into = {};
 }
 
 void StackWalk::interrupted() noexcept {
