@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/runtime/application/build_of.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
@@ -81,6 +82,7 @@ Result<DeclaredApplication> Application::load(const std::string& path, Applicati
   const bool beside = host.has_application();
   PLCHOST_TRY_ASSIGN(auto object,
                      beside ? SharedObject::load_copy(path, kExports) : SharedObject::load(path, kExports));
+  std::string build = build_of(path);
   ApplicationDeclaration declaration;
   host.begin_init(declaration);
   auto called = call_init(object);
@@ -90,13 +92,14 @@ Result<DeclaredApplication> Application::load(const std::string& path, Applicati
     if (beside) unload_version(object, host);
     return std::unexpected(called.error());
   }
-  auto made = built(object, declaration);
+  auto made = built(object, std::move(build), declaration);
   if (made) return DeclaredApplication{*std::move(made), std::move(declaration)};
   end_program(object, host);
   return std::unexpected(std::move(made).error());
 }
 
-Result<Application> Application::built(SharedObject& object, const ApplicationDeclaration& declaration) {
+Result<Application> Application::built(SharedObject& object, std::string build,
+                                       const ApplicationDeclaration& declaration) {
   const std::string path = object.path();
   if (declaration.tasks == nullptr) {
     return failure(ErrorCode::invalid_argument,
@@ -109,11 +112,13 @@ Result<Application> Application::built(SharedObject& object, const ApplicationDe
   TaskCodes codes;
   PLCHOST_TRY_ASSIGN(auto tasks, in_step(path, build_tasks(*declaration.tasks, codes)));
   PLCHOST_TRY(in_step(path, apply_task_settings(declaration.task_options, tasks)));
-  return Application(std::move(object), *declaration.tasks, std::move(tasks), std::move(codes));
+  return Application(std::move(object), std::move(build), *declaration.tasks, std::move(tasks),
+                     std::move(codes));
 }
 
 void Application::exchange(Application& next) noexcept {
   std::swap(object_, next.object_);
+  std::swap(build_, next.build_);
   std::swap(setup_, next.setup_);
 }
 

@@ -41,6 +41,8 @@ class Application {
   [[nodiscard]] bool contains(const void* address) const noexcept { return object_.contains(address); }
 
   [[nodiscard]] const std::string& path() const noexcept { return object_.path(); }
+  /// How its file was built, as that was when it was loaded: see build_of().
+  [[nodiscard]] const std::string& build() const noexcept { return build_; }
   [[nodiscard]] std::string name() const;
   /// The facts that the schedulers need. Their functions point into the application.
   [[nodiscard]] const std::vector<TaskConfig>& tasks() const noexcept { return tasks_; }
@@ -49,13 +51,18 @@ class Application {
   [[nodiscard]] const Task_Info& info(std::size_t index) const noexcept { return *codes_[index]->info; }
 
  private:
-  Application(SharedObject object, const sys_setup_tasks_struct& setup, std::vector<TaskConfig> tasks,
-              TaskCodes codes)
-      : object_(std::move(object)), setup_(&setup), tasks_(std::move(tasks)), codes_(std::move(codes)) {}
-  [[nodiscard]] static Result<Application> built(SharedObject& object,
+  Application(SharedObject object, std::string build, const sys_setup_tasks_struct& setup,
+              std::vector<TaskConfig> tasks, TaskCodes codes)
+      : object_(std::move(object)),
+        build_(std::move(build)),
+        setup_(&setup),
+        tasks_(std::move(tasks)),
+        codes_(std::move(codes)) {}
+  [[nodiscard]] static Result<Application> built(SharedObject& object, std::string build,
                                                  const ApplicationDeclaration& declaration);
 
   SharedObject object_;
+  std::string build_;                    // taken at once: another file may be put into its place
   const sys_setup_tasks_struct* setup_;  // in the application
   std::vector<TaskConfig> tasks_;
   TaskCodes codes_;  // in the order of tasks_

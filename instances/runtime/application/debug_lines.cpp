@@ -297,7 +297,8 @@ void look_at(const ElfFile& file, const Unit& unit, std::span<const Sought> soug
 
 }  // namespace
 
-std::vector<SourceLine> source_lines(const ElfFile& file, std::span<const std::uint64_t> addresses) {
+std::vector<SourceLine> source_lines(const ElfFile& file, std::span<const std::uint64_t> addresses,
+                                     TimePoint deadline) {
   std::vector<SourceLine> lines(addresses.size());
   const ElfFile::Section* const section = file.find(".debug_line");
   if (section == nullptr) return lines;
@@ -306,7 +307,7 @@ std::vector<SourceLine> source_lines(const ElfFile& file, std::span<const std::u
   std::ranges::sort(sought, {}, &Sought::address);
   const std::uint64_t end = std::min(section->size, kMostBytes);
   std::uint64_t at = 0;
-  for (int units = 0; at < end && units < kMostUnits; ++units) {
+  for (int units = 0; at < end && units < kMostUnits && MonotonicClock::now() < deadline; ++units) {
     constexpr std::size_t kLengths = 12;
     const auto head = file.read(*section, at, kLengths);
     ByteReader lengths(head);

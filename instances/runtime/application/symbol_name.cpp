@@ -91,14 +91,16 @@ std::string name_in(const std::string& file, const Mapped& place, const std::opt
 // Of the places in one file, each with its number among all.
 std::vector<std::pair<std::size_t, std::string>> names_in(const std::string& path,
                                                           std::span<const Mapped> mapped,
-                                                          std::span<const std::size_t> of_file) {
+                                                          std::span<const std::size_t> of_file,
+                                                          TimePoint deadline) {
   std::vector<std::uint64_t> addresses;
   for (const std::size_t place : of_file) addresses.push_back(mapped[place].looked_at);
   std::vector<std::optional<ElfFunction>> functions(of_file.size());
   std::vector<SourceLine> lines(of_file.size());
-  if (const auto file = ElfFile::open(path)) {
+  const bool in_time = MonotonicClock::now() < deadline;
+  if (const auto file = in_time ? ElfFile::open(path) : std::nullopt) {
     functions = functions_at(*file, addresses);
-    lines = source_lines(*file, addresses);
+    lines = source_lines(*file, addresses, deadline);
   }
   std::vector<std::pair<std::size_t, std::string>> names;
   const std::string shown_file = file_name(path.c_str());
@@ -110,7 +112,7 @@ std::vector<std::pair<std::size_t, std::string>> names_in(const std::string& pat
 
 }  // namespace
 
-std::vector<std::string> names_of(std::span<const CodePlace> places) {
+std::vector<std::string> names_of(std::span<const CodePlace> places, TimePoint deadline) {
   std::vector<Mapped> mapped;
   std::map<std::string, std::vector<std::size_t>> files;
   for (const CodePlace& place : places) {
@@ -119,7 +121,7 @@ std::vector<std::string> names_of(std::span<const CodePlace> places) {
   }
   std::vector<std::string> names(places.size());
   for (const auto& [path, of_file] : files) {
-    for (auto& [place, name] : names_in(path, mapped, of_file)) names[place] = std::move(name);
+    for (auto& [place, name] : names_in(path, mapped, of_file, deadline)) names[place] = std::move(name);
   }
   return names;
 }

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "shm/base/time.hpp"
+
 namespace plchost {
 
 /// A place in the code of this process.
@@ -21,7 +23,10 @@ struct CodePlace {
 ///
 /// Each file is read once for all its places, and piece by piece. It is read here, in the process that runs
 /// its code: so the author of a file that misleads this reader gains nothing by it.
-[[nodiscard]] std::vector<std::string> names_of(std::span<const CodePlace> places);
+///
+/// At `deadline` no more of a file is read: then the names are those that it exports, or lines are missing.
+[[nodiscard]] std::vector<std::string> names_of(std::span<const CodePlace> places,
+                                                TimePoint deadline = TimePoint::max());
 /// Of one place, which is no return address.
 [[nodiscard]] std::string name_of(std::uintptr_t address);
 

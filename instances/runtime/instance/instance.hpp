@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "instances/runtime/application/application.hpp"
@@ -193,7 +194,10 @@ class Instance {
   void report_tick();
   void report_clock(ClockRuntime& clock);
   void make_outputs_safe(const TaskSet::Fault& fault);
-  [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
+  using KeptFaults = std::vector<std::pair<TaskSet::Fault, ExceptionEntry>>;
+  [[nodiscard]] ExceptionEntry keep_fault(const TaskSet::Fault& fault);
+  void name_faults(const KeptFaults& kept) const;
+  void write_down(const ExceptionEntry& entry) const;
   void add_circumstances(ExceptionEntry& entry, std::size_t index);
   [[nodiscard]] Result<void> restore_operator_events();
   void keep_settings();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 #include "instances/runtime/instance/instance.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/exception_history.hpp"
 
 namespace plchost {
 
@@ -126,8 +128,10 @@ void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
   std::vector<std::string> late;
   for (const std::size_t task : stuck) late.push_back(time_out(task));
   // Each is an exception of its own; the application's state names them all.
-  while (const auto fault = tasks_->take_fault()) (void)keep_fault(*fault);
+  KeptFaults kept;
+  while (const auto fault = tasks_->take_fault()) kept.emplace_back(*fault, keep_fault(*fault));
   enter_exception(fmt::format("stop_timeout: not at the end of its cycle: task {}", fmt::join(late, ", ")));
+  name_faults(kept);
 }
 
 std::string Instance::cut_single_cycle() const {

@@ -337,6 +337,7 @@ TEST(OnlineChangeOfAnInstance, AFaultOfTheNewCodeIsFoundInTheNewFile) {
     const auto history = read_exceptions(kept);
     return history && !history->entries.empty();
   }));
+  (void)sut.process().ask(ControlVerb::status);  // by the thread that finds the names
   const ExceptionEntry entry = read_exceptions(kept)->entries.front();
   EXPECT_EQ(entry.task, "Fault");
   EXPECT_EQ(entry.application, application("online_2"));

@@ -31,14 +31,17 @@ class Faulty {
   }
 
   InstanceProcess& process() { return process_; }
-  /// The exceptions that are kept, when there are as many.
+  /// The exceptions that are kept, when there are as many. The thread that answers has written the names of
+  /// their functions then.
   std::vector<ExceptionEntry> exceptions(std::size_t count = 1) {
     std::vector<ExceptionEntry> found;
     EXPECT_TRUE(eventually([&] {
       const auto history = read_exceptions(exception_path(sandbox_.folder(), "line1"));
-      if (history) found = history->entries;
-      return found.size() >= count;
+      return history && history->entries.size() >= count;
     })) << process_.log();
+    (void)process_.ask(ControlVerb::status);
+    if (const auto named = read_exceptions(exception_path(sandbox_.folder(), "line1")))
+      found = named->entries;
     found.resize(std::max(count, found.size()));
     return found;
   }

@@ -26,7 +26,8 @@ fault_and_way_back() {
   until_true 20 has line1 count "$faults"
   until_true 20 has line1 present true
   has line1 memory_address 0 && has line1 task Divide && has line1 signal SIGFPE && has line1 kind signal || fail "$(plcctl show exception line1)"
-  exception line1 symbol | grep -qF 'divide()+0x' || fail "$(plcctl show exception line1)"
+  symbol_is_known() { exception line1 symbol | grep -qF 'divide()+0x'; }
+  until_true 20 symbol_is_known || fail "$(plcctl show exception line1)"
   is "$(exception line1 back_trace | head -n 1)" "$(exception line1 symbol)" && has line1 back_trace_end "" || fail "$(plcctl show exception line1)"
   until_true 20 task_is line1/Divide exception
   until_true 20 task_is line1/Fast stopped

@@ -69,6 +69,14 @@ TEST_P(CodeOf, HasItsLineIfItsCompilerWroteItDown) {
   EXPECT_THAT(name_at(text), Not(HasSubstr("plc/"))) << "folders are of the machine that has compiled it";
 }
 
+TEST_P(CodeOf, HasTheNameThatItsFileExportsWhenTheTimeIsOver) {
+  auto* const own = function<int()>("own_line");
+  const CodePlace place{.address = reinterpret_cast<std::uintptr_t>(own)};
+  const std::string late = names_of(std::span(&place, 1), TimePoint::min()).front();
+  EXPECT_THAT(late, StartsWith("own_line+0x0 in debug_sample_"));
+  EXPECT_THAT(late, Not(HasSubstr(" at ")));
+}
+
 TEST_P(CodeOf, ThatCallsIsNamedByItsCall) {
   auto* const sut = function<int(void (*)())>("line_of_hidden");
   ASSERT_NE(sut, nullptr);
