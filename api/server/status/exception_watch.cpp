@@ -12,6 +12,7 @@
 #include "api/dds/field_info.hpp"
 #include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -34,16 +35,29 @@ void show_back_trace(plc_ExceptionStatus& sample, const ExceptionEntry& entry) {
                                             : fmt::format("only the innermost {} functions fit", count));
 }
 
+// "GCC 12, build ID 4f": both together have no room in one value.
+std::pair<std::string_view, std::string_view> parts_of_build(std::string_view build) {
+  constexpr std::string_view kBuildId = "build ID ";
+  constexpr std::string_view kBetween = ", ";
+  const std::size_t at = build.rfind(kBuildId);
+  if (at == std::string_view::npos) return {build, {}};
+  std::string_view compiler = build.substr(0, at);
+  if (compiler.ends_with(kBetween)) compiler.remove_suffix(kBetween.size());
+  return {compiler, build.substr(at + kBuildId.size())};
+}
+
 std::vector<plc_KeyValue> circumstances_of(const ExceptionEntry& entry) {
   std::vector<plc_KeyValue> circumstances;
   const auto add = [&](const char* name, std::string_view value) {
     if (value.empty()) return;
     plc_KeyValue& added = circumstances.emplace_back();
     dds::copy_text(added.name, name);
-    dds::copy_text(added.value, value);
+    dds::copy_text(added.value, cut(value, sizeof added.value - 1));
   };
   add("version", entry.version);
-  add("build", entry.build);
+  const auto [build, build_id] = parts_of_build(entry.build);
+  add("build", build);
+  add("build_id", build_id);
   add("scheduler", entry.scheduler);
   add("settings", entry.settings);
   if (!entry.settings.empty()) add("cycles", fmt::format("{}", entry.cycles));

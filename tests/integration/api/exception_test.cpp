@@ -189,7 +189,8 @@ TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
   EXPECT_EQ(json[0]["stopped"], "application");
   EXPECT_EQ(json[0]["uptime_ns"], 12'345'000'000);
   EXPECT_EQ(json[0]["version"], "0.1.0");
-  EXPECT_EQ(json[0]["build"], "GCC 12, build ID 4f");
+  EXPECT_EQ(json[0]["build"], "GCC 12");
+  EXPECT_EQ(json[0]["build_id"], "4f");
   EXPECT_EQ(json[0]["scheduler"], "CmpSchedule");
   EXPECT_EQ(json[0]["settings"], "cyclic, interval 10 ms, priority 4, core 1");
   EXPECT_EQ(json[0]["cycles"], 77);
