@@ -259,7 +259,9 @@ class Host:
         for folder in (self.run, self.state):
             # The last exceptions of an instance and the log of changes are kept for people, and have bounds of their own.
             found["files"] += collections.Counter(str(path.relative_to(folder)) for path in folder.rglob("*")
-                                                  if path.suffix != ".exception" and not path.parent.name.startswith("audit."))
+                                                  if path.suffix not in (".exception", ".exceptions")
+                                                  and not path.name.startswith("exceptions.")
+                                                  and not path.parent.name.startswith("audit."))
         return found
 
 
