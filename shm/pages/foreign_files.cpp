@@ -11,6 +11,7 @@
 
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
@@ -39,9 +40,9 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
       std::ranges::any_of(of_manager, begins)) {
     return Owners::manager;
   }
-  const std::array of_instances = {instance_page_name(pool, ""), instance_claim_name(pool, ""),
+  const std::array of_instances = {instance_page_name(pool, ""),       instance_claim_name(pool, ""),
                                    fmt::format("{}.variables.", pool), outputs_page_name(pool, ""),
-                                   fmt::format("{}.debug.", pool)};
+                                   fmt::format("{}.debug.", pool),     flight_page_name(pool, "")};
   return std::ranges::any_of(of_instances, begins) ? std::optional(Owners::instances) : std::nullopt;
 }
 

@@ -244,14 +244,15 @@ Result<std::string> Instance::make_status_page() {
   PLCHOST_TRY(host_->variables().publish(options_.launch.pool, options_.launch.name));
   PLCHOST_TRY_ASSIGN(auto transitions, TransitionRing::open(options_.launch.pool, options_.launch.name));
   transitions_.emplace(std::move(transitions));
-  PLCHOST_TRY(make_flight_recorder());
+  make_flight_recorder();
   return {};
 }
 
-Result<void> Instance::make_flight_recorder() {
+// Without it, as with a full /dev/shm, the tasks run all the same.
+void Instance::make_flight_recorder() {
   const LaunchOptions& launch = options_.launch;
   FlightPage::remove(launch.pool, launch.name);  // of a process before
-  if (!application_) return {};
+  if (!application_) return;
   std::vector<FlightTask> tasks;
   for (const TaskConfig& task : application_->tasks()) {
     FlightTask told{.name = {}, .iec_priority = task.iec_priority};
@@ -262,8 +263,17 @@ Result<void> Instance::make_flight_recorder() {
     }
     tasks.push_back(told);
   }
-  PLCHOST_TRY_ASSIGN(flight_, FlightPage::create(launch.pool, launch.name, tasks));
-  return {};
+  auto page = FlightPage::create(launch.pool, launch.name, tasks);
+  if (page) {
+    flight_.emplace(std::move(*page));
+  } else {
+    spdlog::warn("there is no flight recorder, so no cause of lost cycles is told: {}",
+                 page.error().describe());
+  }
+}
+
+FlightRing Instance::flight_ring(std::size_t number) {
+  return flight_ ? flight_->ring(number) : FlightRing();
 }
 
 Result<std::string> Instance::make_tasks() {
@@ -289,15 +299,15 @@ Result<std::string> Instance::make_tasks() {
       // cycle does not.
       .to_park = [this](std::size_t index) { unbind(index); },
       .halted = [this] { host_->areas().outputs().fail(); },
-      .flight = [this](std::size_t index) { return flight_->ring(kFirstTaskRing + index); },
-      .control_flight = flight_->ring(kControlRing),
-      .watch_flight = flight_->ring(kWatchRing),
-      .poll_flight = flight_->ring(kPollRing),
+      .flight = [this](std::size_t index) { return flight_ring(kFirstTaskRing + index); },
+      .control_flight = flight_ring(kControlRing),
+      .watch_flight = flight_ring(kWatchRing),
+      .poll_flight = flight_ring(kPollRing),
       .catch_faults = true,
   };
   PLCHOST_TRY_ASSIGN(tasks_,
                      TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment)));
-  losses_.emplace(*flight_, *tasks_, cores_.size() == 1);
+  if (flight_) losses_.emplace(*flight_, *tasks_, cores_.size() == 1);
   host_->task_table().attach(tasks_.get());
   PLCHOST_TRY(attach_debugger());
   reference_ = follow_reference(tasks_->distributed_clock(), start_.settings.scheduler.distributed_clock,

@@ -203,7 +203,8 @@ class Instance {
   void keep_settings();
   void notify_tasks(unsigned event);
   void look_after_page();
-  [[nodiscard]] Result<void> make_flight_recorder();
+  void make_flight_recorder();
+  [[nodiscard]] FlightRing flight_ring(std::size_t number);
 
   Options options_;
   TimePoint begun_ = MonotonicClock::now();  // the process, within milliseconds
@@ -219,7 +220,7 @@ class Instance {
   Components components_;
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
-  std::optional<FlightPage> flight_;  // nothing: there are no tasks
+  std::optional<FlightPage> flight_;  // nothing: no tasks, or no room for it
   bool page_lost_told_ = false;
   TimePoint page_told_;                   // when it was told last that the page was written over
   std::uint64_t page_damages_ = 0;        // how often it was

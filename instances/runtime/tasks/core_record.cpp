@@ -16,11 +16,12 @@ TimePoint time_of(const FlightEntry& entry) noexcept {
 }  // namespace
 
 CoreRecord::CoreRecord(std::span<const FlightTask> tasks, bool one_core)
-    : one_core_(one_core), tasks_(tasks.size()) {
+    : one_core_(one_core), tasks_(tasks.size()), known_since_(kFirstTaskRing + tasks.size()) {
   for (std::size_t i = 0; i < tasks.size(); ++i) tasks_[i].priority = tasks[i].iec_priority;
 }
 
 void CoreRecord::add(std::size_t number, std::span<const FlightEntry> entries, std::uint64_t first) {
+  if (first > 0) known_since_[number] = entries.empty() ? TimePoint::max() : time_of(entries.front());
   if (number >= kFirstTaskRing) {
     add_task(tasks_[number - kFirstTaskRing], entries, first);
   } else if (number == kControlRing) {
@@ -111,13 +112,28 @@ void CoreRecord::complete(TimePoint now) {
   for (const Fault& fault : faults_) {
     if (fault.task < tasks_.size()) close_faulty(fault.task, fault.at);
   }
-  for (OfTask& task : tasks_) {
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    OfTask& task = tasks_[i];
     if (std::exchange(task.open, false)) task.pieces.back().to = std::max(now, task.pieces.back().from);
+    const TimePoint since = known_since(i);
     for (Loss& loss : task.losses) {
+      if (loss.release < since) loss.release = loss.ready = TimePoint{};
       loss.started = std::ranges::any_of(
           starts_, [&](TimePoint start) { return loss.release <= start && start <= loss.ready; });
     }
   }
+}
+
+// From here on the record has all that had the core before the task. What was written over would look as an
+// empty core, and its loss as a stall.
+TimePoint CoreRecord::known_since(std::size_t task) const {
+  TimePoint since = known_since_[kFirstTaskRing + task];
+  for (std::size_t ring = 0; ring < kFirstTaskRing; ++ring) since = std::max(since, known_since_[ring]);
+  for (std::size_t i = 0; one_core_ && i < tasks_.size(); ++i) {
+    if (tasks_[i].priority <= tasks_[task].priority)
+      since = std::max(since, known_since_[kFirstTaskRing + i]);
+  }
+  return since;
 }
 
 // Its thread is parked in the middle of the cycle, for good.

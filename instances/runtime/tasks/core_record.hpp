@@ -20,6 +20,8 @@ class CoreRecord {
 
   /// The entries of ring `number`, of which the first one has number `first`. Once for each ring.
   void add(std::size_t number, std::span<const FlightEntry> entries, std::uint64_t first);
+  /// A fault has stopped the task at that time, for good: it holds the core no longer.
+  void add_fault(std::size_t task, TimePoint at) { faults_.push_back({task, at}); }
   /// No more rings come: cycles that have not ended last until `now`.
   void complete(TimePoint now);
 
@@ -38,7 +40,8 @@ class CoreRecord {
   };
   [[nodiscard]] Share share(std::size_t task, TimePoint from, TimePoint to) const;
 
-  /// Cycles that were lost, and the cycle before them. All times 0: that is not known.
+  /// Cycles that were lost, and the cycle before them. All times 0: that is not known, or the entries since
+  /// its release of a ring that may have had the core are not here.
   struct Loss {
     std::uint64_t entry = 0;  ///< its number in the ring
     std::uint64_t lost = 0;
@@ -75,12 +78,14 @@ class CoreRecord {
 
   void add_control(std::span<const FlightEntry> entries);
   void add_task(OfTask& task, std::span<const FlightEntry> entries, std::uint64_t first) const;
+  [[nodiscard]] TimePoint known_since(std::size_t task) const;
   void close_faulty(std::size_t task, TimePoint at);
 
   bool one_core_;
   std::vector<OfTask> tasks_;
   std::vector<Piece> above_all_;  // not in the order of time
   std::vector<TimePoint> starts_;
+  std::vector<TimePoint> known_since_;  // of each ring: its first entry, if there were entries before it
   struct Fault {
     std::size_t task;
     TimePoint at;

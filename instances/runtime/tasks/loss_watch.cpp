@@ -48,16 +48,15 @@ void LossWatch::look(TimePoint now) {
   const bool lost = ask_tasks();
   const bool calibrates = !lost && ++looks_ % kCalibration == 2;
   if (lost || calibrates) {
-    const CoreRecord record = read(now);
-    compare_times(record, now, calibrates);
-    std::vector<Found> found;
-    for (std::size_t i = 0; i < of_task_.size(); ++i) {
-      for (const CoreRecord::Loss& loss : record.losses(i)) {
-        if (loss.entry < of_task_[i].next) continue;
-        of_task_[i].next = loss.entry + 1;
-        found.push_back({i, loss});
-      }
+    CoreRecord record = read(now, false);
+    std::vector<Found> found = find_new(record);
+    const auto unknown = [](const Found& one) { return one.loss.release == TimePoint{}; };
+    if (std::ranges::any_of(found, unknown)) {  // older entries may tell
+      record = read(now, true);
+      found = find_new(record);
     }
+    for (const Found& one : found) of_task_[one.task].next = one.loss.entry + 1;
+    compare_times(record, now, calibrates);
     std::ranges::stable_sort(found, {}, [](const Found& one) { return one.loss.ready; });
     const std::size_t first = found.size() > kMostAtOnce ? found.size() - kMostAtOnce : 0;
     for (std::size_t i = first; i < found.size(); ++i) tell(record, found[i]);
@@ -65,10 +64,35 @@ void LossWatch::look(TimePoint now) {
   remember(now);
 }
 
-CoreRecord LossWatch::read(TimePoint now) {
+// A count that a stranger has written leads beyond all entries that come: only until it is right again.
+std::vector<LossWatch::Found> LossWatch::find_new(const CoreRecord& record) const {
+  std::vector<Found> found;
+  for (std::size_t i = 0; i < of_task_.size(); ++i) {
+    const std::uint64_t next = std::min(of_task_[i].next, page_.written(kFirstTaskRing + i));
+    for (const CoreRecord::Loss& loss : record.losses(i)) {
+      if (loss.entry >= next) found.push_back({i, loss});
+    }
+  }
+  return found;
+}
+
+// Remembered: its entry in the ring of the control thread lies ever further back.
+TimePoint LossWatch::fault_of(std::size_t task) {
+  TimePoint& at = of_task_[task].fault;
+  const FaultRecord* const fault = tasks_.task(task).fault().published();
+  if (fault != nullptr && at == TimePoint{}) {
+    at = MonotonicClock::now() - Duration(std::max<std::int64_t>(unix_time_ns() - fault->unix_ns, 0));
+  }
+  return at;
+}
+
+CoreRecord LossWatch::read(TimePoint now, bool all) {
   CoreRecord record(page_.tasks(), one_core_);
+  for (std::size_t i = 0; i < of_task_.size(); ++i) {
+    if (const TimePoint at = fault_of(i); at != TimePoint{}) record.add_fault(i, at);
+  }
   for (std::size_t ring = 0; ring < from_.size(); ++ring) {
-    const std::uint64_t from = from_[ring] - std::min(from_[ring], kBack);
+    const std::uint64_t from = all ? 0 : from_[ring] - std::min(from_[ring], kBack);
     const FlightRing::Read read = page_.read(ring, from);
     record.add(ring, read.entries, from + read.skipped);
   }

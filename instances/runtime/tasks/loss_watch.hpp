@@ -12,7 +12,7 @@
 namespace plchost {
 
 /// Finds the cause of each loss of cycles, and keeps it in the flight recorder's page. It runs on the control
-/// thread within 100 ms of the loss. The entries are still there then. Only this process can ask how much
+/// thread within 100 ms of its entry. The entries are still there then. Only this process can ask how much
 /// processor time its threads have used. The cycle itself pays nothing for it.
 ///
 /// A cycle that took too long may have computed, or have stood still because the machine stopped, another
@@ -34,6 +34,7 @@ class LossWatch {
 
  private:
   struct OfTask {
+    TimePoint fault;         // that has stopped it; 0: none
     std::uint64_t lost = 0;  // Task::pace() at the last look
     std::uint64_t next = 0;  // the first entry that was not looked at for losses
     Duration used{};         // processor time at the last look
@@ -47,7 +48,9 @@ class LossWatch {
   };
 
   [[nodiscard]] bool ask_tasks();
-  [[nodiscard]] CoreRecord read(TimePoint now);
+  [[nodiscard]] TimePoint fault_of(std::size_t task);
+  [[nodiscard]] CoreRecord read(TimePoint now, bool all);
+  [[nodiscard]] std::vector<Found> find_new(const CoreRecord& record) const;
   void compare_times(const CoreRecord& record, TimePoint now, bool calibrates);
   void tell(const CoreRecord& record, const Found& found);
   void remember(TimePoint now);

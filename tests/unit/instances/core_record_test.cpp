@@ -167,6 +167,28 @@ TEST_F(CauseOfALoss, IsUnknownIfTheCycleBeforeIsNotInTheRecord) {
   EXPECT_EQ(cause(), LossCause::unknown);
 }
 
+TEST_F(CauseOfALoss, IsUnknownIfEntriesOfATaskAboveSinceItsReleaseWereWrittenOver) {
+  cycle(kAbove, 124, 124, 125);
+  cycle(kBelow, 128, 128, 129);
+  cycle(kLoser, 100, 126, 127);
+  lost(130, 2);
+  const auto known = [&](std::size_t written_over, bool one_core = true) {
+    CoreRecord made(tasks_, one_core);
+    for (std::size_t ring = 0; ring < rings_.size(); ++ring) {
+      made.add(ring, rings_[ring], ring == written_over ? 7 : 0);
+    }
+    made.complete(at_ms(1000));
+    return made.losses(kLoser).at(0).release == at_ms(100);
+  };
+  EXPECT_FALSE(known(kFirstTaskRing + kAbove)) << "it may have had the core, so this is no stall";
+  EXPECT_FALSE(known(kControlRing)) << "of these not even one entry is left";
+  EXPECT_TRUE(known(kFirstTaskRing + kBelow));
+  EXPECT_TRUE(known(kFirstTaskRing + kAbove, false));
+  rings_.at(kFirstTaskRing + kAbove)
+      .insert(rings_.at(kFirstTaskRing + kAbove).begin(), {.time_ns = 99 * kMs});
+  EXPECT_TRUE(known(kFirstTaskRing + kAbove)) << "all since the release is there";
+}
+
 TEST_F(CauseOfALoss, ATaskThatAFaultHasStoppedHoldsNoCore) {
   put(kFirstTaskRing + kAbove, 50, FlightKind::start, 0);  // it never ends
   put(kControlRing, 52, FlightKind::fault, kAbove * 256);

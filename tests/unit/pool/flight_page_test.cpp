@@ -133,9 +133,11 @@ TEST_F(FlightRecorder, PagesOfAllNumbersOfTasksHoldAtLeastTheLastSixtyFourEntrie
   for (const std::size_t tasks : {0U, 1U, 30U, 31U, 200U, 1024U}) {
     FlightPage sut = page(tasks);
     FlightRing ring = sut.ring(kFirstTaskRing + tasks - 1);
-    ring.put(at(1), FlightKind::start);
-    EXPECT_TRUE(FlightPageReader::open(pool(), "line1")) << tasks;
-    EXPECT_GE(flight_capacity(tasks), 128U);
+    const auto put = static_cast<std::int64_t>(2 * flight_capacity(tasks) + 1);
+    for (std::int64_t i = 1; i <= put; ++i) ring.put(at(i), FlightKind::start);
+    auto seen = reader().read(kFirstTaskRing + tasks - 1, 0).entries;
+    ASSERT_GE(seen.size(), 64U) << tasks;
+    for (std::int64_t i = put; i > put - 64; --i, seen.pop_back()) ASSERT_EQ(seen.back().time_ns, i) << tasks;
   }
   EXPECT_EQ(flight_capacity(29), 4096U);
 }

@@ -117,13 +117,14 @@ TEST_F(ForeignFiles, UnderAnyNameOfTheHostAreTakenAwayAndToldAndOthersStay) {
   plant_file(pool + ".posts");
   plant_file(pool + ".wish.line1");
   plant_file(pool + ".variables.line1");
+  plant_file(pool + ".recorder.line1");
   plant_file(pool_memory_name(pool, "line1.retain"));
   plant_file(pool_memory_name(pool, "image"));
   const std::string others = pool + "-another.host";
   plant_file(others);
   ASSERT_TRUE(MemoryFile::create(instance_page_name(pool, "line2"), 10)) << "ours";
   const auto found = take_away();
-  EXPECT_THAT(found, SizeIs(10));
+  EXPECT_THAT(found, SizeIs(11));
   for (const ForeignFile& file : found) {
     EXPECT_TRUE(file.taken_away) << file.taken_away.error().describe();
     EXPECT_FALSE(fs::exists(fs::symlink_status(file.path))) << file.path;
