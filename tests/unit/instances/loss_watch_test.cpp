@@ -34,6 +34,7 @@ class WatchOfLosses : public testing::Test {
       configs_.push_back(config);
     }
     page_.emplace(FlightPage::create(pool_, "line1", told_).value());
+    for (std::size_t i = 0; i < rings_.size(); ++i) rings_[i] = page_->ring(kFirstTaskRing + i);
     TaskEnvironment environment;
     environment.statistics = [this](std::size_t index) -> TaskStatistics& { return statistics_.at(index); };
     environment.allow_unprivileged = true;
@@ -83,11 +84,11 @@ class WatchOfLosses : public testing::Test {
   NoTimes times_;
   std::array<FlightTask, 2> told_;
   std::vector<TaskConfig> configs_;
-  std::array<TaskStatistics, 2> statistics_{};
+  std::array<TaskStatistics, 2> statistics_;
   std::optional<FlightPage> page_;
   std::unique_ptr<TaskSet> tasks_;
   std::optional<LossWatch> sut_;
-  std::array<FlightRing, 2> rings_{page_->ring(kFirstTaskRing), page_->ring(kFirstTaskRing + 1)};
+  std::array<FlightRing, 2> rings_;
 };
 
 TEST_F(WatchOfLosses, ATaskThatAFaultHasStoppedHoldsNoCoreThoughNoEntryTellsOfIt) {
