@@ -166,7 +166,7 @@ TEST_F(OnABadDisk, ExceptionsOfTheDiskReplaceNoneThatTheInstanceHasWritten) {
   fs::remove(written);
   const auto restored = restore_exceptions(file, written);
   ASSERT_TRUE(restored) << restored.error().describe();
-  EXPECT_EQ(read_exceptions(written), read_exceptions(file));
+  EXPECT_EQ(read_exceptions(written).value(), read_exceptions(file).value());
   fs::remove(written);
   entry.task = "Label";
   ASSERT_TRUE(keep_exceptions(written, std::span(&entry, 1)));
