@@ -124,8 +124,8 @@ void CoreRecord::complete(TimePoint now) {
   }
 }
 
-// From here on the record has all that had the core before the task. What was written over would look as an
-// empty core, and its loss as a stall.
+// From here on the record has all that had the core before the task. Entries that were written over would
+// look as an empty core, and its loss as a stall.
 TimePoint CoreRecord::known_since(std::size_t task) const {
   TimePoint since = known_since_[kFirstTaskRing + task];
   for (std::size_t ring = 0; ring < kFirstTaskRing; ++ring) since = std::max(since, known_since_[ring]);
