@@ -92,7 +92,8 @@ CoreRecord LossWatch::read(TimePoint now, bool all) {
     if (const TimePoint at = fault_of(i); at != TimePoint{}) record.add_fault(i, at);
   }
   for (std::size_t ring = 0; ring < from_.size(); ++ring) {
-    const std::uint64_t from = all ? 0 : from_[ring] - std::min(from_[ring], kBack);
+    const std::uint64_t reached = std::min(from_[ring], page_.written(ring));  // see find_new()
+    const std::uint64_t from = all ? 0 : reached - std::min(reached, kBack);
     const FlightRing::Read read = page_.read(ring, from);
     record.add(ring, read.entries, from + read.skipped);
   }

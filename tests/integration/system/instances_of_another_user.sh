@@ -190,7 +190,7 @@ is "$(find "$cell/cell1/manager.lock" "$cell/cell1/manager.sock" "/dev/shm/$pool
 rm "$cell/cell1/core$first_core.latency"
 products 3
 
-echo "- changes of state that it has overwritten keep none of them from its start, nor does a stranger's flight recorder"
+echo "- changes of state that it has overwritten keep none of them from its start, nor does an empty flight recorder"
 rm "/dev/shm/$pool-cell1.recorder.line1"
 as_member touch "/dev/shm/$pool-cell1.recorder.line1"
 printf overwritten | as_instance dd of="/dev/shm/$pool-cell1.transitions.line1" conv=notrunc status=none
@@ -199,8 +199,7 @@ is_another() { state_is line1 running && [ "$(instance line1 pid)" != "$line1" ]
 until_true 30 is_another
 line1=$(pgrep -f "^$BIN/plc-instance --name line1 .*$cell/")
 plcctl list transitions line1 >/dev/null || fail "no changes of state"
-grep -q 'there is no flight recorder' "$cell/cell1.log" || fail "nothing tells that it has none"
-rm "/dev/shm/$pool-cell1.recorder.line1"
+[ -s "/dev/shm/$pool-cell1.recorder.line1" ] || grep -q 'there is no flight recorder' "$cell/cell1.log" || fail "nothing tells that it has none"
 products 3
 
 echo "- without the key the next processes are the manager's user, with the files of the other"
