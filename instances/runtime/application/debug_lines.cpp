@@ -237,7 +237,7 @@ class FileNames {
     const std::uint64_t count = table.unsigned_leb();
     if (entry.empty()) return {};
     for (std::uint64_t i = 0; i < count && table.good(); ++i) {
-      std::string path = path_of(table, entry, i == number);
+      const std::string path = path_of(table, entry, i == number);
       if (i == number) return last_part(path);
     }
     return {};

@@ -64,11 +64,12 @@ void LossWatch::look(TimePoint now) {
   remember(now);
 }
 
-// A count that a stranger has written leads beyond all entries that come: only until it is right again.
+// A count that a stranger has written leads beyond all entries that come: only until it is right again. Then
+// those that are still in the ring are told, some for a second time.
 std::vector<LossWatch::Found> LossWatch::find_new(const CoreRecord& record) const {
   std::vector<Found> found;
   for (std::size_t i = 0; i < of_task_.size(); ++i) {
-    const std::uint64_t next = std::min(of_task_[i].next, page_.written(kFirstTaskRing + i));
+    const std::uint64_t next = of_task_[i].next > page_.written(kFirstTaskRing + i) ? 0 : of_task_[i].next;
     for (const CoreRecord::Loss& loss : record.losses(i)) {
       if (loss.entry >= next) found.push_back({i, loss});
     }
