@@ -96,7 +96,7 @@ Result<std::shared_ptr<ClientLocks>> ClientLocks::open(const std::string& pool, 
   struct stat opened{};
   PLCHOST_TRY(check_errno(::fstat(fd.get(), &opened), "cannot examine " + path));
   if (opened.st_ino != file || !S_ISREG(opened.st_mode)) return not_the_file(pool, path, 0);
-  const std::shared_ptr<ClientLocks> locks(new ClientLocks(path, fd.release(), opened.st_dev, opened.st_ino));
+  std::shared_ptr<ClientLocks> locks(new ClientLocks(path, fd.release(), opened.st_dev, opened.st_ino));
   pools.keep(locks);
   return locks;
 }
