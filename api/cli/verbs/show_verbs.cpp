@@ -11,6 +11,7 @@
 #include "api/cli/terminal.hpp"
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
