@@ -1,6 +1,7 @@
 // Each loss of cycles of a real plc-instance is told with its cause, which a test has injected on purpose.
 #include <csignal>
 #include <optional>
+#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -39,15 +40,17 @@ class LossOfCycles : public ::testing::TestWithParam<const char*> {
     return found;
   }
   /// A loss of the task with this cause, which may be one of several: the machine has others for it, too. If
-  /// it stands still just then, that is the cause. So `event`, which injects this one, is posted once a
-  /// second.
+  /// it stands still just then, or another test uses the core, that is the cause. So `event`, which injects
+  /// this one, is posted again and again, at times that such tests do not have in common.
   std::optional<LossRecord> told(LossCause cause, const char* event = nullptr) {
     std::optional<LossRecord> found;
     TimePoint next_post;
+    std::mt19937 random(std::random_device{}());
+    std::uniform_int_distribution pause_ms(500, 1500);
     EXPECT_TRUE(eventually([&] {
       if (event != nullptr && MonotonicClock::now() >= next_post) {
         post(event);
-        next_post = MonotonicClock::now() + 1s;
+        next_post = MonotonicClock::now() + std::chrono::milliseconds(pause_ms(random));
       }
       for (const LossRecord& loss : losses()) {
         if (loss.cause == cause && loss.task.view() == "Loser") found = loss;
