@@ -17,18 +17,6 @@
 
 namespace plchost {
 
-namespace {
-
-constexpr mode_t kPermissions = 07777;
-
-bool has(const struct stat& status, const MemoryRights& rights) {
-  return status.st_uid == rights.owner.value_or(status.st_uid) &&
-         status.st_gid == rights.group.value_or(status.st_gid) &&
-         (status.st_mode & kPermissions) == rights.mode;
-}
-
-}  // namespace
-
 Result<MemoryRights> pool_rights(const HostConfig& host) {
   MemoryRights rights{.mode = host.pool_mode};
   if (!host.pool_owner.empty()) {
@@ -72,7 +60,7 @@ Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& righ
     return failure(ErrorCode::system, fmt::format("cannot read the rights of pool '{}'", pool), errno);
   }
   PLCHOST_TRY(ClientLocks::renew_rights(pool, rights));
-  if (has(before, rights)) return {};
+  if (has_rights(before, rights)) return {};
   const std::string had = describe_rights(before.st_uid, before.st_gid, before.st_mode);
   PLCHOST_TRY(in_step(fmt::format("pool '{}' keeps {}", pool, had), give_rights(fd.get(), rights, path)));
   struct stat now{};

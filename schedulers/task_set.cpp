@@ -193,7 +193,8 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
     const FaultRecord* const record = tasks_[i]->fault().published();
     if (record == nullptr || fault_taken_[i]) continue;
     fault_taken_[i] = true;
-    tell_fault(i, *record);
+    environment_.control_flight.put(time_of(*record), FlightKind::fault,
+                                    fault_figure(i, std::to_underlying(record->kind)));
     return Fault{.task = i,
                  .name = tasks_[i]->config().name,
                  .record = *record,
@@ -201,14 +202,6 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
                  .whole_application = fault_board_.halted()};
   }
   return std::nullopt;
-}
-
-// At its own time, by the clock of the recorder.
-void TaskSet::tell_fault(std::size_t task, const FaultRecord& record) {
-  constexpr int kKinds = 256;
-  const Duration since(std::max<std::int64_t>(unix_time_ns() - record.unix_ns, 0));
-  const auto figure = static_cast<std::int64_t>(task) * kKinds + std::to_underlying(record.kind);
-  environment_.control_flight.put(MonotonicClock::now() - since, FlightKind::fault, figure);
 }
 
 void TaskSet::look_after_posts() noexcept {

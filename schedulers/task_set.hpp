@@ -262,7 +262,6 @@ class TaskSet {
   [[nodiscard]] Result<void> reset_statistics(Task& task);
   [[nodiscard]] Result<void> check_startable();
   void hand_out_sources();
-  void tell_fault(std::size_t task, const FaultRecord& record);
   void report(std::size_t index, bool running);
   void begin_second_phase();
   void park_tasks(bool that_drive_outputs);

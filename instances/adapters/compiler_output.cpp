@@ -1,7 +1,6 @@
 #include "instances/adapters/compiler_output.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cstddef>
 #include <ranges>
@@ -10,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "shm/base/trimmed.hpp"
 
@@ -96,15 +96,12 @@ class ErrorReader {
   std::string unplaced_;                  // an error whose place may follow
 };
 
-bool is_of_name(char c) noexcept {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
-}
-
 /// The place of this name as a whole word.
 std::size_t find_word(std::string_view text, std::string_view name) {
   for (std::size_t at = text.find(name); at != std::string_view::npos; at = text.find(name, at + 1)) {
     const std::size_t end = at + name.size();
-    if ((at == 0 || !is_of_name(text[at - 1])) && (end == text.size() || !is_of_name(text[end]))) return at;
+    if ((at == 0 || !iec::is_of_name(text[at - 1])) && (end == text.size() || !iec::is_of_name(text[end])))
+      return at;
   }
   return std::string_view::npos;
 }
@@ -157,7 +154,7 @@ std::string undefined_symbol(std::string_view output) {
   const std::size_t at = output.find(kBegin);
   if (at == std::string_view::npos) return "";
   const std::string_view rest = output.substr(at + kBegin.size());
-  return {rest.begin(), std::ranges::find_if_not(rest, is_of_name)};
+  return {rest.begin(), std::ranges::find_if_not(rest, iec::is_of_name)};
 }
 
 iec::SourceProblems pragmas_with(std::string_view name, std::span<const iec::Source> sources) {

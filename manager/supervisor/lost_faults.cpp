@@ -23,10 +23,10 @@ std::vector<ExceptionEntry> faults_of(const InstancePageReader& page) {
     if (!task) continue;
     const TaskIdentity& identity = task->identity;
     ExceptionEntry& entry = found.emplace_back(exception_entry(*fault, application, identity.name.view()));
-    entry.cycles = task->counters.cycles;
-    entry.settings = task_settings(identity.kind, Duration(identity.interval_ns), identity.iec_priority,
-                                   runtime ? runtime->core : -1);
-    if (runtime) entry.scheduler = runtime->scheduler.view();
+    entry.circumstances.cycles = task->counters.cycles;
+    entry.circumstances.settings = task_settings(identity.kind, Duration(identity.interval_ns),
+                                                 identity.iec_priority, runtime ? runtime->core : -1);
+    if (runtime) entry.circumstances.scheduler = runtime->scheduler.view();
   }
   std::ranges::sort(found, {}, &ExceptionEntry::unix_ns);
   return found;

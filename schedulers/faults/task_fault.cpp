@@ -1,5 +1,6 @@
 #include "schedulers/faults/task_fault.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <typeinfo>
 
@@ -28,6 +29,10 @@ FixedText<FaultRecord::kMaxText> type_of_exception() noexcept {
 }
 
 }  // namespace
+
+TimePoint time_of(const FaultRecord& record) noexcept {
+  return MonotonicClock::now() - Duration(std::max<std::int64_t>(unix_time_ns() - record.unix_ns, 0));
+}
 
 void raise_current_exception(TaskFault& fault, bool event_variable) noexcept {
   const auto what = what_of_exception();

@@ -220,8 +220,8 @@ void Supervision::strike(Watched& watched, TimePoint since, TimePoint now, Fault
   if (watched.struck_since == since) return;
   watched.struck_since = since;
   watched.struck_at = now;
-  constexpr int kKinds = 256;
-  flight_.put(now, FlightKind::struck, (&watched - watched_.data()) * kKinds + std::to_underlying(kind));
+  const auto task = static_cast<std::size_t>(&watched - watched_.data());
+  flight_.put(now, FlightKind::struck, fault_figure(task, std::to_underlying(kind)));
   watched.trap->strike(since, kind, figure, limit);
 }
 

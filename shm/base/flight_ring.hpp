@@ -46,10 +46,15 @@ struct FlightEntry {
   std::int64_t figure = 0;
 };
 
+/// So many marks of events have room in an entry.
+inline constexpr std::uint32_t kEventMarkMask = 0x7f'ffff;
 /// Of FlightKind::posted: which event, and its count after the post.
 [[nodiscard]] constexpr std::int64_t posted_figure(std::uint32_t name_mark, std::uint64_t count) noexcept {
-  constexpr std::uint64_t kMarkMask = 0x7f'ffff;
-  return static_cast<std::int64_t>(((name_mark & kMarkMask) << 32) | (count & 0xffff'ffff));
+  return static_cast<std::int64_t>((std::uint64_t{name_mark & kEventMarkMask} << 32) | (count & 0xffff'ffff));
+}
+/// Of FlightKind::fault and FlightKind::struck. `kind`: the number of a FaultKind.
+[[nodiscard]] constexpr std::int64_t fault_figure(std::size_t task, std::uint8_t kind) noexcept {
+  return static_cast<std::int64_t>(task) * 256 + kind;
 }
 
 /// A ring of the last entries of one thread, in memory that other processes may map. The writer never waits

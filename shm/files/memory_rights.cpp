@@ -101,6 +101,13 @@ bool may_give_to(gid_t group) {
   return ::geteuid() == 0 || caller_is_in(group);
 }
 
+bool has_rights(const struct stat& status, const MemoryRights& rights) noexcept {
+  constexpr mode_t kPermissions = 07777;
+  return status.st_uid == rights.owner.value_or(status.st_uid) &&
+         status.st_gid == rights.group.value_or(status.st_gid) &&
+         (status.st_mode & kPermissions) == rights.mode;
+}
+
 std::string describe_rights(uid_t owner, gid_t group, mode_t mode) {
   return fmt::format("owner {}, group {}, mode {:04o}", owner, group, mode & 07777U);
 }

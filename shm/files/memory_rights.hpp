@@ -49,6 +49,9 @@ struct Permission {
 /// root.
 [[nodiscard]] bool may_give_to(gid_t group);
 
+/// Whether a file has these rights already. An owner or a group that is left open is any.
+[[nodiscard]] bool has_rights(const struct stat& status, const MemoryRights& rights) noexcept;
+
 /// "owner 0, group 1000, mode 0660", for errors.
 [[nodiscard]] std::string describe_rights(uid_t owner, gid_t group, mode_t mode);
 

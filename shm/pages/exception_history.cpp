@@ -39,12 +39,12 @@ Json to_json(const ExceptionEntry& entry) {
           {"text", entry.text},
           {"back_trace", entry.back_trace},
           {"back_trace_end", entry.back_trace_end},
-          {"version", entry.version},
-          {"build", entry.build},
-          {"scheduler", entry.scheduler},
-          {"settings", entry.settings},
-          {"cycles", entry.cycles},
-          {"uptime_ns", entry.uptime_ns}};
+          {"version", entry.circumstances.version},
+          {"build", entry.circumstances.build},
+          {"scheduler", entry.circumstances.scheduler},
+          {"settings", entry.circumstances.settings},
+          {"cycles", entry.circumstances.cycles},
+          {"uptime_ns", entry.circumstances.uptime_ns}};
 }
 
 // value() throws if a key is there with another type; the caller catches.
@@ -62,12 +62,12 @@ ExceptionEntry from_json(const Json& json) {
           .text = json.value("text", std::string()),
           .back_trace = json.value("back_trace", std::vector<std::string>()),
           .back_trace_end = json.value("back_trace_end", std::string()),
-          .version = json.value("version", std::string()),
-          .build = json.value("build", std::string()),
-          .scheduler = json.value("scheduler", std::string()),
-          .settings = json.value("settings", std::string()),
-          .cycles = json.value("cycles", std::uint64_t{0}),
-          .uptime_ns = json.value("uptime_ns", std::int64_t{0})};
+          .circumstances = {.version = json.value("version", std::string()),
+                            .build = json.value("build", std::string()),
+                            .scheduler = json.value("scheduler", std::string()),
+                            .settings = json.value("settings", std::string()),
+                            .cycles = json.value("cycles", std::uint64_t{0}),
+                            .uptime_ns = json.value("uptime_ns", std::int64_t{0})}};
 }
 
 std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
@@ -87,17 +87,6 @@ bool holds(const ExceptionHistory& history, const ExceptionEntry& entry) {
 bool tells_less(const ExceptionEntry& entry, const ExceptionEntry& known) {
   return entry.back_trace_end == kUntold || (entry.symbol.empty() && !known.symbol.empty()) ||
          (entry.back_trace.empty() && !known.back_trace.empty());
-}
-
-// The manager, and an instance of a version before, do not know them.
-void take_circumstances(ExceptionEntry& entry, const ExceptionEntry& known) {
-  if (!entry.version.empty() || known.version.empty()) return;
-  entry.version = known.version;
-  entry.build = known.build;
-  entry.scheduler = known.scheduler;
-  entry.settings = known.settings;
-  entry.cycles = known.cycles;
-  entry.uptime_ns = known.uptime_ns;
 }
 
 // Whether it was there and made room for newer ones. If the oldest one that is kept lies in the future, the
@@ -141,7 +130,10 @@ void ExceptionHistory::add(ExceptionEntry entry) {
   if (known != entries.end()) {
     if (tells_less(entry, *known)) return;
     entry.number = known->number;
-    take_circumstances(entry, *known);
+    // The manager, and an instance of a version before, do not know all of them.
+    if (entry.circumstances.version.empty() && !known->circumstances.version.empty()) {
+      entry.circumstances = known->circumstances;
+    }
     *known = std::move(entry);
     return;
   }
@@ -182,13 +174,7 @@ ExceptionEntry exception_entry(const FaultRecord& record, std::string_view appli
           .memory_address = of_memory ? record.memory_address : 0,
           .text = describe_fault(record),
           .back_trace = {},
-          .back_trace_end = stopped ? std::string(kUntold) : describe_end(BackTrace{}),
-          .version = {},
-          .build = {},
-          .scheduler = {},
-          .settings = {},
-          .cycles = 0,
-          .uptime_ns = 0};
+          .back_trace_end = stopped ? std::string(kUntold) : describe_end(BackTrace{})};
 }
 
 std::string task_settings(TaskKind kind, Duration interval, int priority, int core) {

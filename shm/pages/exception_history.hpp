@@ -15,6 +15,17 @@
 
 namespace plchost {
 
+/// The circumstances of an exception, as they were then. Only the process knows all of them.
+struct ExceptionCircumstances {
+  std::string version;         ///< of plchost; empty: not known
+  std::string build;           ///< compiler and build ID, as the application's file has them; empty: neither
+  std::string scheduler;       ///< empty: not known
+  std::string settings;        ///< of the task: see task_settings(); empty: not known
+  std::uint64_t cycles = 0;    ///< of the task that had ended
+  std::int64_t uptime_ns = 0;  ///< of the process; 0: not known
+  bool operator==(const ExceptionCircumstances&) const = default;
+};
+
 /// One exception of an application, as it is kept and shown.
 struct ExceptionEntry {
   std::uint64_t number = 0;  ///< among all exceptions of this instance, from 1
@@ -33,13 +44,7 @@ struct ExceptionEntry {
   /// Of its functions each as `symbol` has it, the innermost first; "0x7f12" where no file is known.
   std::vector<std::string> back_trace;
   std::string back_trace_end;  ///< why there are no more; empty: it is whole
-  // The circumstances, as they were then.
-  std::string version;         ///< of plchost; empty: not known
-  std::string build;           ///< compiler and build ID, as the application's file has them; empty: neither
-  std::string scheduler;       ///< empty: not known
-  std::string settings;        ///< of the task: see task_settings(); empty: not known
-  std::uint64_t cycles = 0;    ///< of the task that had ended
-  std::int64_t uptime_ns = 0;  ///< of the process; 0: not known
+  ExceptionCircumstances circumstances{};
   bool operator==(const ExceptionEntry&) const = default;
 };
 

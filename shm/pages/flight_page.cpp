@@ -81,8 +81,7 @@ std::size_t flight_capacity(std::size_t tasks) noexcept {
 }
 
 std::uint32_t event_mark(std::string_view object) noexcept {
-  constexpr std::uint32_t kBits = 0x7f'ffff;  // as many as posted_figure() carries
-  return crc32c(std::as_bytes(std::span(object))) & kBits;
+  return crc32c(std::as_bytes(std::span(object))) & kEventMarkMask;
 }
 
 std::string flight_page_name(std::string_view pool, std::string_view instance) {

@@ -109,11 +109,7 @@ Result<void> ClientLocks::renew_rights(const std::string& pool, const MemoryRigh
   const auto locks = status ? pools.find(status->st_dev, status->st_ino) : nullptr;
   if (!locks) return {};
   const MemoryRights wanted = rights_of_locks(rights);
-  constexpr mode_t kPermissions = 07777;
-  const bool has = status->st_uid == wanted.owner.value_or(status->st_uid) &&
-                   status->st_gid == wanted.group.value_or(status->st_gid) &&
-                   (status->st_mode & kPermissions) == wanted.mode;
-  return has ? Result<void>() : give_rights(locks->fd_, wanted, path);
+  return has_rights(*status, wanted) ? Result<void>() : give_rights(locks->fd_, wanted, path);
 }
 
 ClientLocks::~ClientLocks() {

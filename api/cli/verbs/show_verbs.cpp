@@ -1,6 +1,7 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -112,29 +113,17 @@ int show_task(CliSession& session, const std::string& name) {
   return task ? show_statistics(session, *task) : CliSession::fail(task.error());
 }
 
-/// The task `name` of the instance; not_found: lists those that there are.
-Result<void> check_task(CliSession& session, const std::string& host, const std::string& instance,
-                        const std::string& name) {
-  PLCHOST_TRY_ASSIGN(const auto tasks, session.client().value()->tasks(host, session.deadline()));
-  std::vector<std::string> names;
-  for (const plc_TaskStatus& task : tasks) {
-    if (dds::text_of(task.instance) != instance) continue;
-    names.emplace_back(dds::text_of(task.task));
-    if (names.back() == name) return {};
-  }
-  return unknown_name("task", name, names, host);
-}
-
 /// Of INSTANCE or INSTANCE/TASK, the oldest first.
 Result<std::vector<Row>> loss_rows(CliSession& session, const std::string& name) {
-  const auto slash = name.find('/');
-  const std::string instance = name.substr(0, slash);
-  const std::string task = slash == std::string::npos ? std::string() : name.substr(slash + 1);
-  PLCHOST_TRY_ASSIGN(const auto host, session.target_host());
-  PLCHOST_TRY(session.check_instance(instance));
-  if (slash != std::string::npos) {
-    PLCHOST_TRY(check_task(session, host, instance, task));
+  std::string instance = name;
+  std::string task;
+  if (name.contains('/')) {
+    PLCHOST_TRY_ASSIGN(std::tie(instance, task), split_name("TASK", name));
+    PLCHOST_TRY(find(session, &ControlClient::tasks, "task", name));
+  } else {
+    PLCHOST_TRY(session.check_instance(instance));
   }
+  PLCHOST_TRY_ASSIGN(const auto host, session.target_host());
   PLCHOST_TRY_ASSIGN(const auto losses,
                      session.client().value()->status<plc_LossStatus>(host, session.deadline()));
   std::vector<Row> rows;

@@ -54,14 +54,14 @@ std::vector<plc_KeyValue> circumstances_of(const ExceptionEntry& entry) {
     dds::copy_text(added.name, name);
     dds::copy_text(added.value, cut(value, sizeof added.value - 1));
   };
-  add("version", entry.version);
-  const auto [build, build_id] = parts_of_build(entry.build);
+  add("version", entry.circumstances.version);
+  const auto [build, build_id] = parts_of_build(entry.circumstances.build);
   add("build", build);
   add("build_id", build_id);
-  add("scheduler", entry.scheduler);
-  add("settings", entry.settings);
-  if (!entry.settings.empty()) add("cycles", fmt::format("{}", entry.cycles));
-  if (entry.uptime_ns != 0) add("uptime_ns", fmt::format("{}", entry.uptime_ns));
+  add("scheduler", entry.circumstances.scheduler);
+  add("settings", entry.circumstances.settings);
+  if (!entry.circumstances.settings.empty()) add("cycles", fmt::format("{}", entry.circumstances.cycles));
+  if (entry.circumstances.uptime_ns != 0) add("uptime_ns", fmt::format("{}", entry.circumstances.uptime_ns));
   return circumstances;
 }
 

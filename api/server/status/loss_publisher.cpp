@@ -36,9 +36,9 @@ bool LossPublisher::follow(const InstanceStatus& instance, TimePoint now) {
   }
   if (watched.pid == 0 || now < watched.next_look) return false;
   watched.next_look = now + kPeriod;
-  bool changed = false;
-  if (!watched.page) changed = open_page(name, watched);
-  return watched.page && show(name, watched) ? true : changed;
+  bool changed = !watched.page && open_page(name, watched);
+  if (watched.page) changed |= show(name, watched);
+  return changed;
 }
 
 bool LossPublisher::open_page(const std::string& instance, Watched& watched) {

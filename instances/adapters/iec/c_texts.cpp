@@ -1,6 +1,7 @@
 #include "instances/adapters/iec/c_texts.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <utility>
 
@@ -79,6 +80,10 @@ class EscapeReader {
 };
 
 }  // namespace
+
+bool is_of_name(char c) noexcept {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+}
 
 std::string with_ended_escapes(std::string_view code, std::string_view before) {
   return EscapeReader(code, before).run();

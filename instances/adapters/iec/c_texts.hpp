@@ -11,6 +11,8 @@ namespace plchost::iec {
 /// Only texts behind `before`, a number and a comma change, if `before` is not empty.
 [[nodiscard]] std::string with_ended_escapes(std::string_view code, std::string_view before = {});
 
+/// Whether names of C, and of Structured Text, have this character.
+[[nodiscard]] bool is_of_name(char c) noexcept;
 /// Where `wanted` is in C code, outside of parentheses, brackets and quotes; npos: nowhere before they close.
 [[nodiscard]] std::size_t find_outside(std::string_view code, std::string_view wanted, std::size_t from = 0);
 /// Where the parenthesis or the bracket at `begin` closes; npos: nowhere.

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 
 namespace plchost::iec {
@@ -146,9 +146,7 @@ class VariableCollector {
   }
   // Whether the name is one of the words of the text.
   static bool names(std::string_view text, std::string_view name) {
-    const auto is_letter = [&](std::size_t at) {
-      return at < text.size() && (std::isalnum(static_cast<unsigned char>(text[at])) != 0 || text[at] == '_');
-    };
+    const auto is_letter = [&](std::size_t at) { return at < text.size() && is_of_name(text[at]); };
     for (std::size_t at = text.find(name); at != std::string_view::npos; at = text.find(name, at + 1)) {
       if (!is_letter(at - 1) && !is_letter(at + name.size())) return true;
     }

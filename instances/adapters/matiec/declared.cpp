@@ -1,7 +1,6 @@
 #include "instances/adapters/matiec/declared.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cstddef>
 #include <ranges>
 #include <utility>
@@ -9,22 +8,19 @@
 
 #include <fmt/format.h>
 
+#include "instances/adapters/iec/c_texts.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 
 namespace plchost::matiec {
 
 namespace {
 
-bool is_of_name(char c) noexcept {
-  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
-}
-
 /// The names in a line of C, in their order. Texts are none.
 std::vector<std::string> names_in(std::string_view line) {
   std::vector<std::string> names;
   for (std::size_t i = 0; i < line.size() && line[i] != '"';) {
     const std::size_t begin = i;
-    while (i < line.size() && is_of_name(line[i])) ++i;
+    while (i < line.size() && iec::is_of_name(line[i])) ++i;
     if (i > begin) {
       names.emplace_back(line.substr(begin, i - begin));
     } else {

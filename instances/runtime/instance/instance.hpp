@@ -33,6 +33,7 @@
 
 namespace plchost {
 
+struct ExceptionCircumstances;
 struct ExceptionEntry;
 
 /// One PLC runtime: everything that a plc-instance process owns. All of it on the control thread; the tasks'
@@ -198,7 +199,7 @@ class Instance {
   [[nodiscard]] ExceptionEntry keep_fault(const TaskSet::Fault& fault);
   void name_faults(const KeptFaults& kept) const;
   void write_down(const ExceptionEntry& entry) const;
-  void add_circumstances(ExceptionEntry& entry, std::size_t index);
+  [[nodiscard]] ExceptionCircumstances circumstances_of(std::size_t index);
   [[nodiscard]] Result<void> restore_operator_events();
   void keep_settings();
   void notify_tasks(unsigned event);

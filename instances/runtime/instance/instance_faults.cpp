@@ -114,7 +114,7 @@ void Instance::make_outputs_safe(const TaskSet::Fault& fault) {
 ExceptionEntry Instance::keep_fault(const TaskSet::Fault& fault) {
   page_->set_task_state(static_cast<std::uint32_t>(fault.task), PageTaskState::exception);
   ExceptionEntry entry = entry_of(fault, application_->path());
-  add_circumstances(entry, fault.task);
+  entry.circumstances = circumstances_of(fault.task);
   spdlog::error("exception: {}", reason_of(entry));
   write_down(entry);
   return entry;
@@ -139,17 +139,19 @@ void Instance::write_down(const ExceptionEntry& entry) const {
   keep_exceptions_of(launch.run_directory, launch.name, std::span(&entry, 1));
 }
 
-void Instance::add_circumstances(ExceptionEntry& entry, std::size_t index) {
+ExceptionCircumstances Instance::circumstances_of(std::size_t index) {
   const TaskConfig& task = application_->tasks()[index];
-  entry.version = PLCHOST_VERSION;
-  entry.build = application_->build();
-  entry.scheduler = scheduler_;
-  entry.settings =
+  ExceptionCircumstances now;
+  now.version = PLCHOST_VERSION;
+  now.build = application_->build();
+  now.scheduler = scheduler_;
+  now.settings =
       task_settings(task.kind, task.interval, task.iec_priority, cores_.size() == 1 ? cores_.front() : -1) +
       watchdog_of(task);
   const auto counters = page_->task(static_cast<std::uint32_t>(index)).counters.read();
-  if (counters) entry.cycles = counters->cycles;
-  entry.uptime_ns = (MonotonicClock::now() - begun_).count();
+  if (counters) now.cycles = counters->cycles;
+  now.uptime_ns = (MonotonicClock::now() - begun_).count();
+  return now;
 }
 
 }  // namespace plchost

@@ -7,8 +7,6 @@ namespace plchost {
 
 namespace {
 
-constexpr std::int64_t kFaultKinds = 256;  // FlightKind::fault: the task is the rest of its figure
-
 TimePoint time_of(const FlightEntry& entry) noexcept {
   return TimePoint(Duration(entry.time_ns));
 }
@@ -42,9 +40,6 @@ void CoreRecord::add_control(std::span<const FlightEntry> entries) {
     if (entry.kind == FlightKind::switched) above_all_.push_back({time - lasted, time, Part::scheduler});
     if (entry.kind == FlightKind::held) above_all_.push_back({time - lasted, time, Part::online_change});
     if (entry.kind == FlightKind::started) starts_.push_back(time);
-    if (entry.kind == FlightKind::fault && entry.figure >= 0) {
-      faults_.push_back({static_cast<std::size_t>(entry.figure / kFaultKinds), time});
-    }
   }
 }
 
@@ -109,9 +104,7 @@ void CoreRecord::add_task(OfTask& task, std::span<const FlightEntry> entries, st
 }
 
 void CoreRecord::complete(TimePoint now) {
-  for (const Fault& fault : faults_) {
-    if (fault.task < tasks_.size()) close_faulty(fault.task, fault.at);
-  }
+  for (const Fault& fault : faults_) close_faulty(fault.task, fault.at);
   for (std::size_t i = 0; i < tasks_.size(); ++i) {
     OfTask& task = tasks_[i];
     if (std::exchange(task.open, false)) task.pieces.back().to = std::max(now, task.pieces.back().from);

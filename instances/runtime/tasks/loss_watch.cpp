@@ -81,9 +81,7 @@ std::vector<LossWatch::Found> LossWatch::find_new(const CoreRecord& record) cons
 TimePoint LossWatch::fault_of(std::size_t task) {
   TimePoint& at = of_task_[task].fault;
   const FaultRecord* const fault = tasks_.task(task).fault().published();
-  if (fault != nullptr && at == TimePoint{}) {
-    at = MonotonicClock::now() - Duration(std::max<std::int64_t>(unix_time_ns() - fault->unix_ns, 0));
-  }
+  if (fault != nullptr && at == TimePoint{}) at = time_of(*fault);
   return at;
 }
 

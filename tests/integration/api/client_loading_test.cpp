@@ -115,11 +115,7 @@ TEST_F(ClientLibrary, ShowsExceptionsAndApplicationsAndTellsOfEach) {
                .symbol = "divide()+0x12 in line.so",
                .text = "integer division by zero",
                .back_trace = {"divide(int, int)+0x12 in line.so", "fill()+0x7 in line.so"},
-               .back_trace_end = {},
-               .version = {},
-               .build = {},
-               .scheduler = {},
-               .settings = {}});
+               .back_trace_end = {}});
   ASSERT_TRUE(write_exceptions(path, history));
   const Client::Exception exception = told.get_future().get();
   EXPECT_EQ(exception.task, "Main");

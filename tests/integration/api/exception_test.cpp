@@ -44,12 +44,12 @@ class ExceptionOfAnInstance : public testing::Test {
                  .text = "integer division by zero",
                  .back_trace = {"divide()+0x12 in line.so", "fill()+0x7 in line.so"},
                  .back_trace_end = "only a part is known",
-                 .version = "0.1.0",
-                 .build = "GCC 12, build ID 4f",
-                 .scheduler = "CmpSchedule",
-                 .settings = "cyclic, interval 10 ms, priority 4, core 1",
-                 .cycles = 77,
-                 .uptime_ns = 12'345'000'000});
+                 .circumstances = {.version = "0.1.0",
+                                   .build = "GCC 12, build ID 4f",
+                                   .scheduler = "CmpSchedule",
+                                   .settings = "cyclic, interval 10 ms, priority 4, core 1",
+                                   .cycles = 77,
+                                   .uptime_ns = 12'345'000'000}});
     ASSERT_TRUE(write_exceptions(path(), history));
   }
   std::optional<plc_ExceptionStatus> shown(const std::string& instance) {

@@ -216,13 +216,14 @@ TEST(TaskException, TellsItsCircumstances) {
   Faulty sut("[Task.Divide]\nWatchdog.TimeUs=20000\nWatchdog.Sensitivity=2\n");
   (void)sut.process().event("divide").post();
   const ExceptionEntry found = sut.exceptions().front();
-  EXPECT_EQ(found.scheduler, "CmpSchedule");
-  EXPECT_THAT(found.settings, AllOf(HasSubstr("external, priority 4, core "),
-                                    HasSubstr(", watchdog 20 ms x 2, a fault stops the application")));
-  EXPECT_NE(found.version, "");
-  EXPECT_THAT(found.build, HasSubstr("build ID "));
-  EXPECT_EQ(found.cycles, 0U);
-  EXPECT_GT(found.uptime_ns, 0);
+  EXPECT_EQ(found.circumstances.scheduler, "CmpSchedule");
+  EXPECT_THAT(found.circumstances.settings,
+              AllOf(HasSubstr("external, priority 4, core "),
+                    HasSubstr(", watchdog 20 ms x 2, a fault stops the application")));
+  EXPECT_NE(found.circumstances.version, "");
+  EXPECT_THAT(found.circumstances.build, HasSubstr("build ID "));
+  EXPECT_EQ(found.circumstances.cycles, 0U);
+  EXPECT_GT(found.circumstances.uptime_ns, 0);
 }
 
 class EachScheduler : public ::testing::TestWithParam<const char*> {};

@@ -26,12 +26,12 @@ class ExceptionHistoryTest : public testing::Test {
     made.text = std::move(text);
     made.back_trace = {"fill(int)+0x12 in line.so", "0x7f12"};
     made.back_trace_end = "only a part is known";
-    made.version = "0.1.0";
-    made.build = "GCC 12, build ID 4f";
-    made.scheduler = "CmpSchedule";
-    made.settings = "cyclic, interval 10 ms, priority 4, core 1";
-    made.cycles = 5;
-    made.uptime_ns = 7;
+    made.circumstances.version = "0.1.0";
+    made.circumstances.build = "GCC 12, build ID 4f";
+    made.circumstances.scheduler = "CmpSchedule";
+    made.circumstances.settings = "cyclic, interval 10 ms, priority 4, core 1";
+    made.circumstances.cycles = 5;
+    made.circumstances.uptime_ns = 7;
     return made;
   }
 
@@ -65,7 +65,7 @@ TEST_F(ExceptionHistoryTest, OfAVersionBeforeHasNoCircumstances) {
   const auto back = read_exceptions(path_);
   ASSERT_TRUE(back) << back.error().describe();
   EXPECT_EQ(back->entries[0].task, "Fill");
-  EXPECT_EQ(back->entries[0].settings, "");
+  EXPECT_EQ(back->entries[0].circumstances.settings, "");
 }
 
 TEST_F(ExceptionHistoryTest, TakesWhatAnotherHasInTheOrderAndWithTheNumbersOfThat) {
@@ -136,9 +136,10 @@ TEST_F(ExceptionHistoryTest, KeepsTheCircumstancesThatAnotherFinderDoesNotKnow) 
   sut.add(fault);
   ExceptionEntry poorer = fault;
   poorer.symbol = "fill()+0x12";
-  poorer.version = poorer.build = poorer.scheduler = poorer.settings = "";
-  poorer.cycles = 0;
-  poorer.uptime_ns = 0;
+  poorer.circumstances.version = poorer.circumstances.build = poorer.circumstances.scheduler =
+      poorer.circumstances.settings = "";
+  poorer.circumstances.cycles = 0;
+  poorer.circumstances.uptime_ns = 0;
   sut.add(poorer);
   fault.number = 1;
   fault.symbol = "fill()+0x12";

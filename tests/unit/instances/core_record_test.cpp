@@ -38,6 +38,7 @@ class CauseOfALoss : public testing::Test {
   CoreRecord record(bool one_core = true) {
     CoreRecord made(tasks_, one_core);
     for (std::size_t ring = 0; ring < rings_.size(); ++ring) made.add(ring, rings_[ring], 0);
+    if (above_stopped_at_ms_ != 0) made.add_fault(kAbove, at_ms(above_stopped_at_ms_));
     made.complete(at_ms(1000));
     return made;
   }
@@ -54,6 +55,7 @@ class CauseOfALoss : public testing::Test {
   std::vector<FlightTask> tasks_{3};
   std::vector<std::vector<FlightEntry>> rings_{kFirstTaskRing + 3};
   CoreRecord::Share share_;
+  std::int64_t above_stopped_at_ms_ = 0;  // by a fault; 0: it was not
 };
 
 TEST_F(CauseOfALoss, IsItsOwnOverrunIfItsCycleTookLongerThanTheIntervalByItself) {
@@ -191,7 +193,7 @@ TEST_F(CauseOfALoss, IsUnknownIfEntriesOfATaskAboveSinceItsReleaseWereWrittenOve
 
 TEST_F(CauseOfALoss, ATaskThatAFaultHasStoppedHoldsNoCore) {
   put(kFirstTaskRing + kAbove, 50, FlightKind::start, 0);  // it never ends
-  put(kControlRing, 52, FlightKind::fault, kAbove * 256);
+  above_stopped_at_ms_ = 52;
   cycle(kLoser, 100, 100, 125);
   lost(130, 2);
   EXPECT_EQ(cause(), LossCause::own_overrun);
