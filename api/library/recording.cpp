@@ -143,7 +143,7 @@ unsigned long long Client::record_variables(const std::string& host, const std::
   bool has_ended = false;
   const auto use = [&](const VariableListing& sample) {
     const bool goes_on = sink(value_or_throw(text.lines_of(sample)));
-    return ++samples != options.count && goes_on;
+    return ++samples != options.count && goes_on && (!options.goes_on || options.goes_on());
   };
   const auto sleep = [&](TimePoint next) {
     has_ended = !recorded.sleep_until(next);

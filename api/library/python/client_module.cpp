@@ -116,11 +116,15 @@ unsigned long long record_variables(Client& self, const std::string& host, const
                                     double duration, unsigned long long count, const std::string& file,
                                     const std::optional<py::function>& sink) {
   if (sink && !file.empty()) throw ClientError(ClientError::invalid_argument, "name a file or a sink");
-  const Client::RecordOptions options{milliseconds_of(interval), duration_of(duration), count};
+  const auto looks_for_signals = [] {  // Ctrl-C: neither a file nor each sink runs a line of Python
+    const py::gil_scoped_acquire gil;
+    if (::PyErr_CheckSignals() != 0) throw py::error_already_set();
+    return true;
+  };
+  const Client::RecordOptions options{milliseconds_of(interval), duration_of(duration), count,
+                                      looks_for_signals};
   const auto take = [&sink](const std::string& lines) {
     const py::gil_scoped_acquire gil;
-    if (::PyErr_CheckSignals() != 0)
-      throw py::error_already_set();  // Ctrl-C: a sink may run no line of Python
     return !(*sink)(ToPython()(lines)).is(py::bool_(false));
   };
   const py::gil_scoped_release release;

@@ -303,7 +303,7 @@ TEST_F(ClientVariables, AreRecordedAsPlcctlRecordsThem) {
   EXPECT_TRUE(ours[1].ends_with(",7,line.total")) << ours[1];
 }
 
-TEST_F(ClientVariables, AreRecordedUntilTheSinkHasEnough) {
+TEST_F(ClientVariables, AreRecordedUntilTheSinkHasEnoughOrItsCallerDoes) {
   std::string text;
   const auto count =
       sut_.record_variables("hosta", "line1", {"fast.*"}, {milliseconds(10)}, [&](const std::string& lines) {
@@ -312,6 +312,11 @@ TEST_F(ClientVariables, AreRecordedUntilTheSinkHasEnough) {
       });
   EXPECT_EQ(count, 5U);
   EXPECT_EQ(lines_of(text).size(), 6U) << text;
+  int asked = 0;
+  const Client::RecordOptions twice{milliseconds(10), milliseconds(0), 100, [&] { return ++asked < 2; }};
+  const std::string file = host_.run_directory() + "/record.csv";
+  EXPECT_EQ(sut_.record_variables("hosta", "line1", {"fast.*"}, twice, file), 2U);
+  EXPECT_EQ(lines_of(contents_of(file)).size(), 3U) << contents_of(file);
   const auto throws = [](const std::string& /*lines*/) -> bool { throw std::out_of_range("mine"); };
   EXPECT_THROW((void)sut_.record_variables("hosta", "line1", {"fast.*"}, {}, throws), std::out_of_range);
 }

@@ -221,11 +221,14 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
     except KeyError:
         pass
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
-    try:
-        client.record_variables(*of, interval=0.02, sink=texts.append)  # for ever, without a line of Python
-    except KeyboardInterrupt:
-        pass
+    for way in {"sink": texts.append}, {"file": sys.argv[1] + ".ended", "duration": 1e6}:
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            client.record_variables(*of, interval=0.02, **way)  # for ever, without a line of Python
+        except KeyboardInterrupt:
+            pass
+    ended = open(sys.argv[1] + ".ended").read().splitlines()
+    assert ended[0] == written[0] and len(ended) > 1, ended
 EOF
 PYTHONPATH=$BIN/../python timeout 120 python3 "$cell/records.py" "$cell/record.csv" || fail "recordings of Python"
 plcctl record variables press1 'fast.*' line.label --duration 0.05 --interval 0.02 --file "$cell/of_plcctl.csv"
