@@ -33,7 +33,6 @@ constexpr std::array kProgramFolders = {"/usr/sbin/", "/usr/bin/", "/sbin/", "/b
 constexpr auto kUpdateGrub = "update-grub";
 constexpr auto kGrubConfig = "/boot/grub/grub.cfg";
 constexpr auto kFirstEnvironment = "/proc/1/environ";
-constexpr std::array kContainerMarks = {"/run/systemd/container", "/run/.containerenv", "/.dockerenv"};
 
 using Words = std::vector<std::string>;
 
@@ -318,10 +317,7 @@ bool container_by_environment() {
 }
 
 std::string container_mark(const FixOrder& order) {
-  const HostFiles files(order.root);
-  for (const char* const mark : kContainerMarks) {
-    if (files.exists(mark)) return mark;
-  }
+  if (std::string mark = host_check::container_mark(HostFiles(order.root)); !mark.empty()) return mark;
   return order.root.empty() && container_by_environment() ? kFirstEnvironment : "";
 }
 

@@ -26,6 +26,14 @@ HostFinding unknown(std::string subject, const Error& error, std::string why) {
                  std::move(why));
 }
 
+std::string container_mark(const HostFiles& files) {
+  // Of systemd, podman, docker.
+  for (const char* const mark : {"/run/systemd/container", "/run/.containerenv", "/.dockerenv"}) {
+    if (files.exists(mark)) return mark;
+  }
+  return {};
+}
+
 std::optional<HostFinding> unless_on(const HostFiles& files, const std::string& path,
                                      const std::string& subject, const std::string& why) {
   if (files.kernel_lacks(path)) return finding(FindingLevel::ok, subject, "the kernel has none", why);

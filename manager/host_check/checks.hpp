@@ -47,6 +47,7 @@ HostFinding compaction(const CheckedHost& host);
 HostFinding numa_balancing(const CheckedHost& host);
 // checks_machine.cpp
 HostFinding machine(const CheckedHost& host);
+HostFinding container(const CheckedHost& host);
 
 // Their common parts: check_parts.cpp
 
@@ -55,6 +56,9 @@ HostFinding machine(const CheckedHost& host);
                                   std::string why = {}, std::string advice = {});
 /// A note that this cannot be known, and why not.
 [[nodiscard]] HostFinding unknown(std::string subject, const Error& error, std::string why);
+
+/// The file that says that this is a container; empty: none does.
+[[nodiscard]] std::string container_mark(const HostFiles& files);
 
 /// Of a number of the kernel that switches something on: the finding when it is off, not there or not known.
 /// Nothing: it is on.

@@ -43,6 +43,7 @@ constexpr std::array kChecks = {
     HostCheck{"huge_pages", &host_check::huge_pages},
     HostCheck{"compaction", &host_check::compaction},
     HostCheck{"machine", &host_check::machine},
+    HostCheck{"container", &host_check::container},
 };
 static_assert(kChecks.size() <= kMaxFindings);
 

@@ -61,6 +61,7 @@ constexpr std::array kFixes = {
     Fix{.check = "huge_pages", .by = {kUnit}, .text = "madvise"},
     Fix{.check = "compaction", .by = {kSysctl}, .text = "vm.compact_unevictable_allowed"},
     Fix{.check = "machine", .text = "hypervisor and firmware are out of reach of the host's files"},
+    Fix{.check = "container", .text = "a container has the kernel of the machine outside"},
 };
 
 constexpr std::array kWordsOfPlan = {"isolcpus=", "nohz_full=", "rcu_nocbs=", "irqaffinity=", "preempt="};
@@ -183,13 +184,37 @@ std::span<const Fix> host_fixes() noexcept {
   return kFixes;
 }
 
+namespace {
+
+// As a shell reads a line that begins outside of quotes: a comment begins a word.
+std::string_view without_comment(std::string_view line) {
+  char quote = '\0';
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (quote != '\0') {
+      if (c == '\\' && quote == '"') {
+        ++i;
+      } else if (c == quote) {
+        quote = '\0';
+      }
+    } else if (c == '"' || c == '\'') {
+      quote = c;
+    } else if (c == '#' && (i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t' || line[i - 1] == ';')) {
+      return line.substr(0, i);
+    }
+  }
+  return line;
+}
+
+}  // namespace
+
 std::vector<std::string> words_that_clash(std::string_view file) {
   std::vector<std::string> found;
   std::istringstream lines{std::string(file)};
-  for (std::string line; std::getline(lines, line);) {
-    line.resize(std::min(line.find('#'), line.size()));
+  for (std::string text; std::getline(lines, text);) {
+    const std::string_view line = without_comment(text);
     for (const std::string_view word : kWordsOfPlan) {
-      if (line.find(word) != std::string::npos) found.emplace_back(word);
+      if (line.find(word) != std::string_view::npos) found.emplace_back(word);
     }
   }
   return found;

@@ -158,6 +158,14 @@ TEST(HostCheckKernel, NotesAWatchdogOnAnInstancesCore) {
   EXPECT_EQ(tree.look("watchdog").found, "off");
 }
 
+TEST(HostCheckKernel, TellsAContainerByTheFileThatItsMakerHasPutThere) {
+  const FakeTree tree;
+  EXPECT_EQ(tree.look("container").level, FindingLevel::ok);
+  tree.write("/run/.containerenv", "");
+  EXPECT_EQ(tree.look("container").level, FindingLevel::note);
+  EXPECT_EQ(tree.look("container").found, "/run/.containerenv says that this is one");
+}
+
 TEST(HostCheckKernel, TellsAVirtualMachineAndWhatItLost) {
   const FakeTree tree;
   EXPECT_THAT(tree.look("machine").found, StartsWith("not known: "));

@@ -137,6 +137,8 @@ TEST(HostPlan, FindsWordsOfOthersThatWouldClash) {
   EXPECT_THAT(words_that_clash("GRUB_CMDLINE_LINUX_DEFAULT=\"quiet isolcpus=3 nohz_full=3\"\n"),
               ElementsAre("isolcpus=", "nohz_full="));
   EXPECT_THAT(words_that_clash("# GRUB_CMDLINE_LINUX_DEFAULT=\"isolcpus=3\"\nGRUB_TIMEOUT=5\n"), IsEmpty());
+  EXPECT_THAT(words_that_clash(R"(GRUB_CMDLINE_LINUX="a=#1 \"b # c' isolcpus=3"  # nohz_full=3)"),
+              ElementsAre("isolcpus="));
 }
 
 TEST(HostPlan, FindsAFileThatDropsItsWords) {
