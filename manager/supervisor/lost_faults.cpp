@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 
 #include "shm/pages/exception_history.hpp"
+#include "shm/pages/flight_activity.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/instance_page.hpp"
 
 namespace plchost {
@@ -13,7 +15,8 @@ namespace plchost {
 namespace {
 
 // In the order in which they were found.
-std::vector<ExceptionEntry> faults_of(const InstancePageReader& page) {
+std::vector<ExceptionEntry> faults_of(const InstancePageReader& page,
+                                      const Result<FlightPageReader>& recorder) {
   std::vector<ExceptionEntry> found;
   const auto runtime = page.runtime();
   const std::string application(runtime ? runtime->application.view() : std::string_view());
@@ -26,6 +29,7 @@ std::vector<ExceptionEntry> faults_of(const InstancePageReader& page) {
     entry.circumstances.cycles = task->counters.cycles;
     entry.circumstances.settings = task_settings(identity.kind, Duration(identity.interval_ns),
                                                  identity.iec_priority, runtime ? runtime->core : -1);
+    if (recorder) entry.activity = activity_before(*recorder, time_of(*fault));
     if (runtime) entry.circumstances.scheduler = runtime->scheduler.view();
   }
   std::ranges::sort(found, {}, &ExceptionEntry::unix_ns);
@@ -38,7 +42,7 @@ std::string keep_lost_faults(std::string_view pool, std::string_view run_directo
                              std::string_view instance) {
   const auto page = InstancePageReader::open(pool, instance);
   if (!page) return {};
-  const std::vector<ExceptionEntry> faults = faults_of(*page);
+  const std::vector<ExceptionEntry> faults = faults_of(*page, FlightPageReader::open(pool, instance));
   if (faults.empty()) return {};
   keep_exceptions_of(run_directory, instance, faults);
   return fmt::format("task '{}': {}", faults.back().task, faults.back().text);

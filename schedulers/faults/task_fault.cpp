@@ -30,10 +30,6 @@ FixedText<FaultRecord::kMaxText> type_of_exception() noexcept {
 
 }  // namespace
 
-TimePoint time_of(const FaultRecord& record) noexcept {
-  return MonotonicClock::now() - Duration(std::max<std::int64_t>(unix_time_ns() - record.unix_ns, 0));
-}
-
 void raise_current_exception(TaskFault& fault, bool event_variable) noexcept {
   const auto what = what_of_exception();
   const auto type = type_of_exception();

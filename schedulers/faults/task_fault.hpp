@@ -40,9 +40,6 @@ class FaultBoard {
   std::atomic<bool> halted_{false};
 };
 
-/// When it was found, by the clock of the tasks, unless CLOCK_REALTIME was set since. Any context.
-[[nodiscard]] TimePoint time_of(const FaultRecord& record) noexcept;
-
 /// The fault of one task: raised once, by the first finder, and kept.
 class TaskFault {
  public:

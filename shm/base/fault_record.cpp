@@ -1,5 +1,6 @@
 #include "shm/base/fault_record.hpp"
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdlib>
@@ -90,6 +91,10 @@ std::string_view to_string(FaultKind kind) noexcept {
       return "no_processor";
   }
   return "unknown";
+}
+
+TimePoint time_of(const FaultRecord& record) noexcept {
+  return MonotonicClock::now() - Duration(std::max<std::int64_t>(unix_time_ns() - record.unix_ns, 0));
 }
 
 std::string describe_end(const BackTrace& trace) {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "shm/base/names.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -73,6 +74,8 @@ struct FaultRecord {
   FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
 };
 
+/// When it was found, by the clock of the tasks, unless CLOCK_REALTIME was set since. Any context.
+[[nodiscard]] TimePoint time_of(const FaultRecord& record) noexcept;
 /// In words: the cause, with its figures. Without addresses, which only the process can name.
 [[nodiscard]] std::string describe_fault(const FaultRecord& record);
 /// "SIGSEGV"; "signal 40" if it has no name here.

@@ -39,6 +39,7 @@ Json to_json(const ExceptionEntry& entry) {
           {"text", entry.text},
           {"back_trace", entry.back_trace},
           {"back_trace_end", entry.back_trace_end},
+          {"activity", entry.activity},
           {"version", entry.circumstances.version},
           {"build", entry.circumstances.build},
           {"scheduler", entry.circumstances.scheduler},
@@ -62,6 +63,7 @@ ExceptionEntry from_json(const Json& json) {
           .text = json.value("text", std::string()),
           .back_trace = json.value("back_trace", std::vector<std::string>()),
           .back_trace_end = json.value("back_trace_end", std::string()),
+          .activity = json.value("activity", std::vector<std::string>()),
           .circumstances = {.version = json.value("version", std::string()),
                             .build = json.value("build", std::string()),
                             .scheduler = json.value("scheduler", std::string()),
@@ -105,9 +107,15 @@ std::string to_text(const ExceptionHistory& history) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-// As much of it as a reader takes: the newest exceptions, and of these the newest back-traces.
+// As much of it as a reader takes: the newest exceptions, and of these the newest activities and back-traces.
 std::string bounded_text(ExceptionHistory history) {
   std::string text = to_text(history);
+  for (ExceptionEntry& entry : history.entries) {
+    if (text.size() <= kMaxFile) return text;
+    if (entry.activity.empty()) continue;
+    entry.activity.clear();
+    text = to_text(history);
+  }
   for (ExceptionEntry& entry : history.entries) {
     if (text.size() <= kMaxFile) return text;
     if (entry.back_trace.empty()) continue;
@@ -130,6 +138,7 @@ void ExceptionHistory::add(ExceptionEntry entry) {
   if (known != entries.end()) {
     if (tells_less(entry, *known)) return;
     entry.number = known->number;
+    if (entry.activity.empty()) entry.activity = known->activity;
     // The manager, and an instance of a version before, do not know all of them.
     if (entry.circumstances.version.empty() && !known->circumstances.version.empty()) {
       entry.circumstances = known->circumstances;

@@ -43,7 +43,8 @@ struct ExceptionEntry {
   std::string text;                  ///< the cause, with its figures
   /// Of its functions each as `symbol` has it, the innermost first; "0x7f12" where no file is known.
   std::vector<std::string> back_trace;
-  std::string back_trace_end;  ///< why there are no more; empty: it is whole
+  std::string back_trace_end;           ///< why there are no more; empty: it is whole
+  std::vector<std::string> activity{};  ///< of all tasks before it, see activity_before()
   ExceptionCircumstances circumstances{};
   bool operator==(const ExceptionEntry&) const = default;
 };

@@ -172,6 +172,10 @@ std::string FlightPageReader::task_name(std::size_t index) const {
   return printable(std::string(name.view()));
 }
 
+std::uint32_t FlightPageReader::event_mark(std::size_t index) const noexcept {
+  return flight_task_of(memory_, index).event_mark;
+}
+
 FlightRing::Read FlightPageReader::read(std::size_t number, std::uint64_t from) const {
   return FlightRing::read(written_of(memory_, task_count_, number),
                           words_of(memory_, task_count_, capacity_, number), from);

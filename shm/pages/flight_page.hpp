@@ -132,6 +132,7 @@ class FlightPageReader {
   [[nodiscard]] std::size_t task_count() const noexcept { return task_count_; }
   /// Printable. `index` < task_count().
   [[nodiscard]] std::string task_name(std::size_t index) const;
+  [[nodiscard]] std::uint32_t event_mark(std::size_t index) const noexcept;
   /// Ring `number` < kFirstTaskRing + task_count(). Entries that a stranger has written are not left out.
   [[nodiscard]] FlightRing::Read read(std::size_t number, std::uint64_t from) const;
   /// Place `place` < kLossesKept; nothing: none there. Its text is printable.

@@ -155,6 +155,13 @@ std::string format_back_trace(const std::string& functions) {
   return text.empty() ? text : "back_trace\n" + text;
 }
 
+std::string format_activity(const std::string& entries) {
+  std::string text;
+  std::istringstream lines(entries);
+  for (std::string entry; std::getline(lines, entry);) text += fmt::format("  {}\n", printable(entry));
+  return text.empty() ? text : "activity\n" + text;
+}
+
 // For people: no field that says nothing, addresses as tools print them.
 std::string format_exception(Row row) {
   for (const char* field : {"address", "memory_address"}) {
@@ -172,11 +179,13 @@ std::string format_exception(Row row) {
   row["back_trace_end"] = end;
   const auto back_trace = row["back_trace"].get<std::string>();
   row.erase("back_trace");
+  const auto activity = row["activity"].get<std::string>();
+  row.erase("activity");
   Row said;
   for (const auto& [field, value] : row.items()) {
     if (!value.is_string() || !value.get_ref<const std::string&>().empty()) said[field] = value;
   }
-  return format_fields(said) + format_back_trace(back_trace);
+  return format_fields(said) + format_back_trace(back_trace) + format_activity(activity);
 }
 
 int show_exception(CliSession& session, const std::string& name) {

@@ -35,6 +35,15 @@ void show_back_trace(plc_ExceptionStatus& sample, const ExceptionEntry& entry) {
                                             : fmt::format("only the innermost {} functions fit", count));
 }
 
+// The last whole lines that there is room for.
+void show_activity(plc_ExceptionStatus& sample, const ExceptionEntry& entry) {
+  constexpr std::size_t kMost = sizeof sample.activity - 1;
+  std::size_t size = 0;
+  auto first = entry.activity.rbegin();
+  for (; first != entry.activity.rend() && size + first->size() <= kMost; ++first) size += first->size() + 1;
+  dds::copy_text(sample.activity, fmt::format("{}", fmt::join(first.base(), entry.activity.end(), "\n")));
+}
+
 // "GCC 12, build ID 4f": both together have no room in one value.
 std::pair<std::string_view, std::string_view> parts_of_build(std::string_view build) {
   constexpr std::string_view kBuildId = "build ID ";
@@ -126,6 +135,7 @@ void ExceptionWatch::show(Watched& watched, const ExceptionHistory& history) {
   dds::copy_text(sample.text, last.text);
   dds::copy_text(sample.application, last.application);
   show_back_trace(sample, last);
+  show_activity(sample, last);
   // The table has the sample with the ones before until it gets this one.
   watched.before = std::exchange(watched.circumstances, circumstances_of(last));
   dds::lend(sample.ext, watched.circumstances);

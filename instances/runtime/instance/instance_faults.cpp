@@ -15,6 +15,7 @@
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/exception_history.hpp"
+#include "shm/pages/flight_activity.hpp"
 #include "shm/plc_process_image.h"
 
 namespace plchost {
@@ -115,6 +116,7 @@ ExceptionEntry Instance::keep_fault(const TaskSet::Fault& fault) {
   page_->set_task_state(static_cast<std::uint32_t>(fault.task), PageTaskState::exception);
   ExceptionEntry entry = entry_of(fault, application_->path());
   entry.circumstances = circumstances_of(fault.task);
+  if (flight_) entry.activity = activity_before(*flight_, time_of(fault.record));
   spdlog::error("exception: {}", reason_of(entry));
   write_down(entry);
   return entry;

@@ -33,23 +33,25 @@ class ExceptionOfAnInstance : public testing::Test {
   /// One more in the file of line1, as its process would write it.
   void add(const std::string& task) {
     auto history = read_exceptions(path()).value();
-    history.add({.unix_ns = 1'789'000'000'123'456'789,
-                 .application = "/opt/line.so",
-                 .task = task,
-                 .kind = "signal",
-                 .whole_application = true,
-                 .signal = "SIGFPE",
-                 .address = 0x7f0012345678,
-                 .symbol = "divide()+0x12 in line.so",
-                 .text = "integer division by zero",
-                 .back_trace = {"divide()+0x12 in line.so", "fill()+0x7 in line.so"},
-                 .back_trace_end = "only a part is known",
-                 .circumstances = {.version = "0.1.0",
-                                   .build = "GCC 12, build ID 4f",
-                                   .scheduler = "CmpSchedule",
-                                   .settings = "cyclic, interval 10 ms, priority 4, core 1",
-                                   .cycles = 77,
-                                   .uptime_ns = 12'345'000'000}});
+    history.add(
+        {.unix_ns = 1'789'000'000'123'456'789,
+         .application = "/opt/line.so",
+         .task = task,
+         .kind = "signal",
+         .whole_application = true,
+         .signal = "SIGFPE",
+         .address = 0x7f0012345678,
+         .symbol = "divide()+0x12 in line.so",
+         .text = "integer division by zero",
+         .back_trace = {"divide()+0x12 in line.so", "fill()+0x7 in line.so"},
+         .back_trace_end = "only a part is known",
+         .activity = {"-1.204 ms Fill: start, 3.1 us after its release", "-0.000 ms Fill: posts \x1b"},
+         .circumstances = {.version = "0.1.0",
+                           .build = "GCC 12, build ID 4f",
+                           .scheduler = "CmpSchedule",
+                           .settings = "cyclic, interval 10 ms, priority 4, core 1",
+                           .cycles = 77,
+                           .uptime_ns = 12'345'000'000}});
     ASSERT_TRUE(write_exceptions(path(), history));
   }
   std::optional<plc_ExceptionStatus> shown(const std::string& instance) {
@@ -177,7 +179,10 @@ TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
   EXPECT_THAT(text.output, HasSubstr("back_trace_end  only a part is known\n"
                                      "back_trace\n"
                                      "  #0  divide()+0x12 in line.so\n"
-                                     "  #1  fill()+0x7 in line.so\n"));
+                                     "  #1  fill()+0x7 in line.so\n"
+                                     "activity\n"
+                                     "  -1.204 ms Fill: start, 3.1 us after its release\n"
+                                     "  -0.000 ms Fill: posts ?\n"));
   EXPECT_THAT(text.output, Not(HasSubstr("memory_address"))) << "nothing is known of it";
   EXPECT_THAT(text.output, AllOf(HasSubstr("settings        cyclic, interval 10 ms, priority 4, core 1\n"),
                                  HasSubstr("cycles          77\n"), HasSubstr("uptime          12.3 s\n")));
@@ -212,6 +217,18 @@ TEST_F(ExceptionOfAnInstance, HasAsManyWholeFunctionsAsThereIsRoomFor) {
   const auto seen = shown("line1").value();
   EXPECT_EQ(std::string(seen.back_trace).size(), 10 * 401U - 1);
   EXPECT_STREQ(seen.back_trace_end, "only the innermost 10 functions fit");
+}
+
+TEST_F(ExceptionOfAnInstance, HasTheLastEntriesOfTheActivityThatThereIsRoomFor) {
+  ExceptionEntry entry;
+  entry.task = "Fill";
+  for (int i = 0; i < 60; ++i) entry.activity.push_back(std::to_string(i) + std::string(98, 'x'));
+  ExceptionHistory history;
+  history.add(entry);
+  ASSERT_TRUE(write_exceptions(path(), history));
+  ASSERT_TRUE(eventually_shown(1));
+  const std::string seen = shown("line1").value().activity;
+  EXPECT_THAT(seen, AllOf(::testing::StartsWith("20x"), ::testing::EndsWith(entry.activity.back())));
 }
 
 TEST_F(ExceptionOfAnInstance, IsInTheReport) {

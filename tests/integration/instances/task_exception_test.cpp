@@ -226,6 +226,20 @@ TEST(TaskException, TellsItsCircumstances) {
   EXPECT_GT(found.circumstances.uptime_ns, 0);
 }
 
+TEST(TaskException, TellsTheLastCyclesAndEventsOfAllTasks) {
+  Faulty sut(kWatchdogs);
+  (void)sut.process().event("divide").post();
+  const ExceptionEntry found = sut.exceptions().front();
+  const auto begins = [](const char* words) {
+    return ::testing::ContainsRegex(std::string(R"(^-[0-9]+\.[0-9]+ ms )") + words);
+  };
+  EXPECT_THAT(found.activity, ::testing::Contains(begins("Divide: takes post 1")));
+  EXPECT_THAT(found.activity, ::testing::Contains(begins("Divide: start, ")));
+  EXPECT_THAT(found.activity, Not(::testing::Contains(begins("Divide: end"))))
+      << "it did not come to its end";
+  EXPECT_THAT(found.activity.back(), HasSubstr("runtime: exception, signal of Divide"));
+}
+
 class EachScheduler : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(EachScheduler, StopsALoopInTheFirstCycle) {

@@ -23,6 +23,7 @@
 namespace plchost {
 namespace {
 
+using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
@@ -171,6 +172,7 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   EXPECT_NE(kept->entries[0].address, 0U);
   EXPECT_TRUE(kept->entries[0].back_trace.empty());
   EXPECT_THAT(kept->entries[0].back_trace_end, StartsWith("only its process knew it"));
+  EXPECT_THAT(kept->entries[0].activity, Contains(HasSubstr("DoubleFree: start, ")));
   EXPECT_GT(kept->entries[0].unix_ns, 0);
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::wrong_state);
   const TimePoint before = MonotonicClock::now();

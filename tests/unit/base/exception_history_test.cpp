@@ -26,6 +26,7 @@ class ExceptionHistoryTest : public testing::Test {
     made.text = std::move(text);
     made.back_trace = {"fill(int)+0x12 in line.so", "0x7f12"};
     made.back_trace_end = "only a part is known";
+    made.activity = {"-1.204 ms Fill: start, 3.1 us after its release"};
     made.circumstances.version = "0.1.0";
     made.circumstances.build = "GCC 12, build ID 4f";
     made.circumstances.scheduler = "CmpSchedule";
