@@ -135,8 +135,8 @@ class PLCHOST_CLIENT_API Client {
     std::chrono::milliseconds interval{100};  ///< from one sample to the next, 10 ms to an hour
     std::chrono::milliseconds duration{0};    ///< up to 1e9 s; 0: no end after a time
     unsigned long long count = 0;             ///< of samples; 0: no end after a number
-    /// Asked after each sample, on the thread of the call. False ends the recording. An exception does, too,
-    /// and comes out of the call.
+    /// Asked after each sample, and each 0.1 s while the call waits, on its thread. False ends the recording.
+    /// An exception does, too, and comes out of the call.
     std::function<bool()> goes_on = {};
   };
   /// Takes the next lines of a recording. False: it is enough.

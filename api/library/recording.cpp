@@ -1,5 +1,6 @@
 // Recordings of variables as CSV.
 #include <algorithm>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -38,7 +39,9 @@ class Recorded {
     Duration timeout;  // of each sample
   };
 
-  Recorded(Sampling& sampling, Group group) : sampling_(sampling), group_(std::move(group)) {}
+  /// `goes_on`: asked while it waits; empty: nobody is.
+  Recorded(Sampling& sampling, Group group, const std::function<bool()>& goes_on)
+      : sampling_(sampling), group_(std::move(group)), goes_on_(goes_on) {}
 
   [[nodiscard]] Result<VariableListing> sample(TimePoint latest) {
     const TimePoint deadline = std::min<TimePoint>(MonotonicClock::now() + group_.timeout, latest);
@@ -49,12 +52,14 @@ class Recorded {
     if (page) return *std::move(page);
     return client_has_ended();
   }
-  /// False: the client ends before.
+  /// False: the client ends before, or its caller has enough.
   [[nodiscard]] bool sleep_until(TimePoint end) {
     return answer_of<bool>(
                [end](ClientCore& core, const Answer<bool>& answer) { return sleep(core, answer, end); })
         .has_value();
   }
+
+  [[nodiscard]] bool has_enough() const noexcept { return has_enough_; }
 
  private:
   template <class T>
@@ -83,6 +88,13 @@ class Recorded {
     sampling_.begin([asking = std::move(asking), answer = std::move(answer)](ClientCore& core) {
       return asking(core, answer);
     });
+    constexpr auto kNextQuestion = std::chrono::milliseconds(100);
+    while (future.wait_for(kNextQuestion) == std::future_status::timeout) {
+      if (goes_on_ && !goes_on_()) {
+        has_enough_ = true;
+        return std::nullopt;
+      }
+    }
     try {
       return future.get();
     } catch (const std::future_error&) {
@@ -92,6 +104,8 @@ class Recorded {
 
   Sampling& sampling_;
   Group group_;
+  const std::function<bool()>& goes_on_;
+  bool has_enough_ = false;
 };
 
 void check_options(const Client::RecordOptions& options) {
@@ -134,7 +148,8 @@ unsigned long long Client::record_variables(const std::string& host, const std::
   }
   const auto place = value_or_throw(worker_->run<std::string>(
       [&](ClientCore& core) { return host_in_turn(worker_->order(), core, host); }));
-  Recorded recorded(watcher_->sampling(), {place, instance, query, worker_->order().timeout()});
+  Recorded recorded(watcher_->sampling(), {place, instance, query, worker_->order().timeout()},
+                    options.goes_on);
   SampleTimes times{.interval = options.interval};
   if (options.duration.count() > 0) times.until = MonotonicClock::now() + options.duration;
   RecordingText text;
@@ -149,13 +164,14 @@ unsigned long long Client::record_variables(const std::string& host, const std::
     has_ended = !recorded.sleep_until(next);
     return !has_ended;
   };
-  const bool answered = value_or_throw(
+  const auto answered =
       sample_again_and_again(times, {.sample = [&](TimePoint latest) { return recorded.sample(latest); },
                                      .use = use,
                                      .sleep_until = sleep,
-                                     .tell_silence = [&](const Error& error) { silence = error; }}));
+                                     .tell_silence = [&](const Error& error) { silence = error; }});
+  if (recorded.has_enough()) return samples;
   if (has_ended) throw_client_error(client_has_ended().error());
-  if (!answered) throw_client_error(silence);
+  if (!value_or_throw(answered)) throw_client_error(silence);
   return samples;
 }
 

@@ -54,7 +54,8 @@ struct ExportedPlant {
 /// For people, also in the file.
 inline constexpr std::string_view kNotExported =
     "not exported, as a running instance does not tell it: bodies, initial values, functions, constants of "
-    "MATIEC, temporary variables and VAR_IN_OUT; function blocks are structures of their variables";
+    "MATIEC, temporary variables, VAR_IN_OUT and VAR_EXTERNAL; function blocks are structures of their "
+    "variables";
 
 /// PLCopen TC6 XML 2.01: each host is a configuration, each instance a resource. Bodies are not known, so
 /// those of POUs have no statement. Names become those that ST allows; where they differ, a documentation

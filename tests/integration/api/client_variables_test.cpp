@@ -317,6 +317,8 @@ TEST_F(ClientVariables, AreRecordedUntilTheSinkHasEnoughOrItsCallerDoes) {
   const std::string file = host_.run_directory() + "/record.csv";
   EXPECT_EQ(sut_.record_variables("hosta", "line1", {"fast.*"}, twice, file), 2U);
   EXPECT_EQ(lines_of(contents_of(file)).size(), 3U) << contents_of(file);
+  const Client::RecordOptions hourly{std::chrono::hours(1), milliseconds(0), 2, [&] { return ++asked < 5; }};
+  EXPECT_EQ(sut_.record_variables("hosta", "line1", {"fast.*"}, hourly, file), 1U) << "asked while it waits";
   const auto throws = [](const std::string& /*lines*/) -> bool { throw std::out_of_range("mine"); };
   EXPECT_THROW((void)sut_.record_variables("hosta", "line1", {"fast.*"}, {}, throws), std::out_of_range);
 }

@@ -221,10 +221,12 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
     except KeyError:
         pass
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    for way in {"sink": texts.append}, {"file": sys.argv[1] + ".ended", "duration": 1e6}:
+    file = {"file": sys.argv[1] + ".ended", "duration": 1e6}
+    for way in {"interval": 0.02, "sink": texts.append}, {"interval": 3600, "count": 2, "sink": texts.append}, {"interval": 0.02, **file}:
         threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
         try:
-            client.record_variables(*of, interval=0.02, **way)  # for ever, without a line of Python
+            client.record_variables(*of, **way)  # for ever, without a line of Python
+            raise AssertionError("Ctrl-C is lost")
         except KeyboardInterrupt:
             pass
     ended = open(sys.argv[1] + ".ended").read().splitlines()
