@@ -17,11 +17,11 @@ namespace plchost {
 
 /// Why a task lost cycles. The numbers are part of the DDS API.
 enum class LossCause : std::uint32_t {
-  unknown = 0,      ///< the record of that time was written over before it was looked at
-  own_overrun = 1,  ///< the cycle before took longer than the interval by itself
-  task_above = 2,   ///< tasks of the instance with at least its priority had the core
-  stall = 3,      ///< none of the instance's threads had it: the machine stood still, or another process ran
-  scheduler = 4,  ///< an exchange of the scheduler
+  unknown = 0,     ///< the record of that time was written over before it was looked at
+  long_cycle = 1,  ///< the cycle before took longer than the interval by itself
+  task_above = 2,  ///< tasks of the instance with at least its priority had the core
+  stall = 3,       ///< none of the instance's threads had it: the machine stood still, or another process ran
+  scheduler = 4,   ///< an exchange of the scheduler
   online_change = 5,   ///< an online change, or values that were written between two cycles
   halt = 6,            ///< a debugger held the task
   start = 7,           ///< the tasks were started meanwhile

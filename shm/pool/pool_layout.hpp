@@ -35,9 +35,10 @@ inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
 /// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed. 4:
 /// the PID namespace. 5: events say whether posts are taken, and are marked. 6: references are a flat table.
 inline constexpr std::uint32_t kPoolVersion = 6;
-/// The same layout, of a pool whose users may be in several PID namespaces. The mutexes are
-/// ClientMutexes, and whether a client runs is told by ClientLocks. Programs that do not know it refuse it.
-inline constexpr std::uint32_t kPoolVersionAcross = 7;
+/// The same layout, of a pool whose users may be in several PID namespaces: a version of its own with each
+/// kPoolVersion. The mutexes are ClientMutexes, and whether a client runs is told by ClientLocks. Programs
+/// that do not know it refuse it.
+inline constexpr std::uint32_t kPoolVersionAcross = kPoolVersion + 1000;
 
 /// Of what the pool's mutex orders, or what is checked after it was read without it.
 inline constexpr auto kRelaxed = std::memory_order_relaxed;

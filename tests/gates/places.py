@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One of each thing that the READMEs tell how to add is added to a scratch copy of the tree.
+"""One of each thing of PLACES, which the READMEs tell how to add, is added to a scratch copy of the tree.
 
 It compiles, and the parts that are made from it name it. The files that were written by hand are those of the table below
 "To add a ..." in its README. It must be each of them, no other, and not more than PLACES allows. Their texts are in

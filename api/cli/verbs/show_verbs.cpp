@@ -170,10 +170,10 @@ std::string format_exception(Row row) {
   }
   row.erase("time_unix_ns");
   constexpr double kNsPerSecond = 1e9;
-  if (row.contains("uptime_ns") && row["uptime_ns"].is_number()) {
+  if (row["uptime_ns"].is_number())
     row["uptime"] = fmt::format("{:.1f} s", row["uptime_ns"].get<double>() / kNsPerSecond);
-    row.erase("uptime_ns");
-  }
+  row.erase("uptime_ns");
+  if (row["settings"].get_ref<const std::string&>().empty()) row.erase("cycles");
   const Row end = row["back_trace_end"];  // beside the back-trace
   row.erase("back_trace_end");
   row["back_trace_end"] = end;

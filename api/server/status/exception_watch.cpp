@@ -4,13 +4,11 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include <code_words.hpp>
 #include <fmt/format.h>
 
 #include "api/dds/field_info.hpp"
-#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
@@ -55,23 +53,15 @@ std::pair<std::string_view, std::string_view> parts_of_build(std::string_view bu
   return {compiler, build.substr(at + kBuildId.size())};
 }
 
-std::vector<plc_KeyValue> circumstances_of(const ExceptionEntry& entry) {
-  std::vector<plc_KeyValue> circumstances;
-  const auto add = [&](const char* name, std::string_view value) {
-    if (value.empty()) return;
-    plc_KeyValue& added = circumstances.emplace_back();
-    dds::copy_text(added.name, name);
-    dds::copy_text(added.value, cut(value, sizeof added.value - 1));
-  };
-  add("version", entry.circumstances.version);
-  const auto [build, build_id] = parts_of_build(entry.circumstances.build);
-  add("build", build);
-  add("build_id", build_id);
-  add("scheduler", entry.circumstances.scheduler);
-  add("settings", entry.circumstances.settings);
-  if (!entry.circumstances.settings.empty()) add("cycles", fmt::format("{}", entry.circumstances.cycles));
-  if (entry.circumstances.uptime_ns != 0) add("uptime_ns", fmt::format("{}", entry.circumstances.uptime_ns));
-  return circumstances;
+void show_circumstances(plc_ExceptionStatus& sample, const ExceptionCircumstances& then) {
+  const auto [build, build_id] = parts_of_build(then.build);
+  dds::copy_text(sample.version, then.version);
+  dds::copy_text(sample.build, cut(build, sizeof sample.build - 1));
+  dds::copy_text(sample.build_id, cut(build_id, sizeof sample.build_id - 1));
+  dds::copy_text(sample.scheduler, then.scheduler);
+  dds::copy_text(sample.settings, cut(then.settings, sizeof sample.settings - 1));
+  sample.cycles = then.cycles;
+  sample.uptime_ns = then.uptime_ns;
 }
 
 }  // namespace
@@ -93,7 +83,7 @@ bool ExceptionWatch::follow(const InstanceStatus& instance, const TaskWatch& tas
 }
 
 bool ExceptionWatch::end_round() {
-  const bool changed = table_->dispose_rest();  // while the samples have their circumstances
+  const bool changed = table_->dispose_rest();
   std::erase_if(instances_, [](const auto& entry) { return !entry.second.followed; });
   for (auto& [name, watched] : instances_) watched.followed = false;
   table_->write();
@@ -136,9 +126,7 @@ void ExceptionWatch::show(Watched& watched, const ExceptionHistory& history) {
   dds::copy_text(sample.application, last.application);
   show_back_trace(sample, last);
   show_activity(sample, last);
-  // The table has the sample with the ones before until it gets this one.
-  watched.before = std::exchange(watched.circumstances, circumstances_of(last));
-  dds::lend(sample.ext, watched.circumstances);
+  show_circumstances(sample, last.circumstances);
 }
 
 }  // namespace plchost

@@ -4,7 +4,6 @@
 #include <map>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <control.h>
 
@@ -41,8 +40,6 @@ class ExceptionWatch {
     TimePoint next_look;
     FileVersion version;
     plc_ExceptionStatus sample{};
-    std::vector<plc_KeyValue> circumstances;  // the sample has them on loan
-    std::vector<plc_KeyValue> before;
     bool followed = true;  // in this round
   };
   void look(Watched& watched, const std::string& name);

@@ -240,7 +240,7 @@ LossCause cause_of(const CoreRecord::Loss& loss, const CoreRecord::Share& share,
   const Duration own = share.own - own_stall;
   // A cycle that would have ended in time by itself is not to blame, however large its part is.
   const bool by_itself = own >= interval && own >= most.time;
-  return by_itself || most.time == Duration::zero() ? LossCause::own_overrun : most.cause;
+  return by_itself || most.time == Duration::zero() ? LossCause::long_cycle : most.cause;
 }
 
 }  // namespace plchost

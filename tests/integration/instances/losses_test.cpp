@@ -76,7 +76,7 @@ class LossOfCycles : public ::testing::TestWithParam<const char*> {
 };
 
 TEST_P(LossOfCycles, ByACycleThatTookTooLongIsToldAsItsOwn) {
-  const auto loss = told(LossCause::own_overrun, "overrun");
+  const auto loss = told(LossCause::long_cycle, "overrun");
   ASSERT_TRUE(loss);
   EXPECT_GE(loss->lost, 6U);
   EXPECT_GE(loss->own_ns, 20 * kMs) << all();
@@ -107,7 +107,7 @@ TEST_P(LossOfCycles, ByAnEventVariableThatTakesLongIsToldSo) {
 }
 
 TEST_P(LossOfCycles, OfATaskThatLostNoneIsNotTold) {
-  ASSERT_TRUE(told(LossCause::own_overrun, "overrun"));
+  ASSERT_TRUE(told(LossCause::long_cycle, "overrun"));
   for (const LossRecord& loss : losses()) EXPECT_EQ(loss.task.view(), "Loser");
 }
 

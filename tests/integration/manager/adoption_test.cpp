@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include "tests/integration/manager/costs_cycles.hpp"
 #include "tests/integration/manager/plant.hpp"
-#include "tests/support/core_witness.hpp"
 #include "tests/support/receive_until.hpp"
 
 namespace plchost {
@@ -28,22 +28,17 @@ TEST(Manager, StopsNoInstanceWhenItIsKilledAndTheNextOneAdoptsThem) {
   EXPECT_EQ(plant.ask(ControlVerb::set_scheduler, "drive1", "CmpScheduleTimer").code, ErrorCode::ok);
   const int line = plant.status("line1").pid;
   const int drive = plant.status("drive1").pid;
-  const CoreWitness witness(plant.status("drive1").core, std::chrono::milliseconds(1));
-  const TaskCounters before = plant.counters("drive1");
-  plant.kill_manager();
-  EXPECT_TRUE(plant.wait_for_cycles("drive1", 50));
-  plant.start_manager();
-  ASSERT_TRUE(plant.wait_for("drive1", InstanceState::running));
-  ASSERT_TRUE(plant.wait_for("line1", InstanceState::stopped));
+  EXPECT_FALSE(costs_cycles(plant, "drive1", [&](std::uint32_t /*round*/) {
+    plant.kill_manager();
+    EXPECT_TRUE(plant.wait_for_cycles("drive1", 50));
+    plant.start_manager();
+    EXPECT_TRUE(plant.wait_for("drive1", InstanceState::running));
+    EXPECT_TRUE(plant.wait_for("line1", InstanceState::stopped));
+  }));
   EXPECT_EQ(plant.status("line1").pid, line);
   EXPECT_EQ(plant.status("drive1").pid, drive);
   EXPECT_EQ(plant.status("drive1").core, 0);
   EXPECT_EQ(plant.status("drive1").scheduler.view(), "CmpScheduleTimer");
-  EXPECT_TRUE(plant.wait_for_cycles("drive1", 1500));  // a tenth is more than one pause of the process takes
-  const TaskCounters after = plant.counters("drive1");
-  EXPECT_GE(after.cycles, before.cycles + 50);  // the counters went on
-  // A shared machine takes single cycles; a task that waits for a manager loses all of them.
-  EXPECT_LE(after.lost_cycles - before.lost_cycles, (after.cycles - before.cycles) / 10 + witness.taken());
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::ok);
 
   // It goes on supervising them.

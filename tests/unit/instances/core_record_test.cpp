@@ -61,7 +61,7 @@ class CauseOfALoss : public testing::Test {
 TEST_F(CauseOfALoss, IsItsOwnOverrunIfItsCycleTookLongerThanTheIntervalByItself) {
   cycle(kLoser, 100, 101, 125);
   lost(130, 2);
-  EXPECT_EQ(cause(), LossCause::own_overrun);
+  EXPECT_EQ(cause(), LossCause::long_cycle);
   EXPECT_EQ(share_.own, std::chrono::milliseconds(24));
   EXPECT_EQ(share_.none, std::chrono::milliseconds(1));
 }
@@ -87,7 +87,7 @@ TEST_F(CauseOfALoss, IsNoTaskBelow) {
   cycle(kBelow, 95, 95, 130);
   cycle(kLoser, 100, 100, 125);
   lost(130, 2);
-  EXPECT_EQ(cause(), LossCause::own_overrun);
+  EXPECT_EQ(cause(), LossCause::long_cycle);
   EXPECT_EQ(share_.above, Duration::zero());
 }
 
@@ -196,7 +196,7 @@ TEST_F(CauseOfALoss, ATaskThatAFaultHasStoppedHoldsNoCore) {
   above_stopped_at_ms_ = 52;
   cycle(kLoser, 100, 100, 125);
   lost(130, 2);
-  EXPECT_EQ(cause(), LossCause::own_overrun);
+  EXPECT_EQ(cause(), LossCause::long_cycle);
 }
 
 TEST_F(CauseOfALoss, OfTwoTasksAboveTheOneOfTheHigherPriorityHadTheCore) {

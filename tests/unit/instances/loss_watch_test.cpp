@@ -100,7 +100,7 @@ TEST_F(WatchOfLosses, ATaskThatAFaultHasStoppedHoldsNoCoreThoughNoEntryTellsOfIt
   lose(kLater);
   look(kLater + 50);
   ASSERT_EQ(losses().size(), 1U);
-  EXPECT_EQ(losses().front().cause, LossCause::own_overrun);
+  EXPECT_EQ(losses().front().cause, LossCause::long_cycle);
   EXPECT_EQ(losses().front().above_ns, 0);
 }
 

@@ -1,4 +1,4 @@
-// What the threads of an instance did last, in words.
+// The last entries of a flight recorder in words.
 #include "shm/pages/flight_activity.hpp"
 
 #include <set>

@@ -145,7 +145,7 @@ TEST_F(FlightRecorder, PagesOfAllNumbersOfTasksHoldAtLeastTheLastSixtyFourEntrie
 TEST_F(FlightRecorder, KeepsTheLastEightLossesOfATaskAndRoomForThoseOfOthers) {
   FlightPage sut = page(20);
   LossRecord loss;
-  loss.cause = LossCause::own_overrun;
+  loss.cause = LossCause::long_cycle;
   for (int i = 0; i < 100; ++i) sut.add_loss(0, loss);
   const FlightPageReader seen = reader();
   std::set<std::uint64_t> numbers;
