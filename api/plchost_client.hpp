@@ -116,6 +116,7 @@ class PLCHOST_CLIENT_API Client {
   using Event = client_types::Event;
   using Writer = client_types::Writer;
   using Exception = client_types::Exception;
+  using Loss = client_types::Loss;
   using TaskStatistics = client_types::TaskStatistics;
   using Object = client_types::Object;
   using Node = client_types::Node;
@@ -258,6 +259,8 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Application> applications(const std::string& host = {});
   /// The last exception of each instance; count 0: it never had one.
   std::vector<Exception> exceptions(const std::string& host = {});
+  /// The last lost cycles of the tasks, with their causes.
+  std::vector<Loss> losses(const std::string& host = {});
   /// The fate of the posts of each client; first (source all zero) of all together.
   std::vector<Writer> writers(const std::string& host = {});
   /// All figures of a task, at most a second old. From the first call on, the Client receives the figures of

@@ -146,6 +146,10 @@ std::vector<Client::Exception> Client::exceptions(const std::string& host) {
   return list_or_throw<plc_ExceptionStatus>(*worker_, host);
 }
 
+std::vector<Client::Loss> Client::losses(const std::string& host) {
+  return list_or_throw<plc_LossStatus>(*worker_, host);
+}
+
 std::vector<Client::Writer> Client::writers(const std::string& host) {
   return list_or_throw<plc_WriterStatus>(*worker_, host);
 }

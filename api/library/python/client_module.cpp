@@ -64,6 +64,7 @@ void define_calls(ClientClass& client) {
       .def("events", &Client::events, py::arg("host") = "", NoGil())
       .def("applications", &Client::applications, py::arg("host") = "", NoGil())
       .def("exceptions", &Client::exceptions, py::arg("host") = "", NoGil())
+      .def("losses", &Client::losses, py::arg("host") = "", NoGil())
       .def("writers", &Client::writers, py::arg("host") = "", NoGil())
       .def("objects", &Client::objects, py::arg("host") = "", py::arg("pattern") = "",
            "The objects of the pool whose names match: '*' any characters, '?' one.", NoGil())
