@@ -1,7 +1,6 @@
 /*
  * The process image: how firmware (an I/O driver, say) exchanges inputs and outputs with an instance of
  * plchost. Plain C89 with GCC's or clang's atomic builtins, nothing to link:
- *
  *     gcc -std=c89 -D_POSIX_C_SOURCE=200809L -I FOLDER_OF_THIS_FILE firmware.c
  *
  *     plc_image inputs, outputs;
@@ -13,24 +12,21 @@
  *
  * An image is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance has its inputs or
  * outputs in it with [SysMem] Linux.Area.n.Object=NAME in its settings. The first one makes it, firmware or
- * instance; it outlives both. (One that was a memory of plc_pool.h before stays as long as that: make it with
- * PLC_POOL_KEEP.) It has one writer at a time and any number of readers; nobody ever waits for anybody, also
- * if the other one is pre-empted or killed within. The writer fills a slot that is not the latest and then
- * publishes it. The reader copies the latest and looks whether it was overtaken meanwhile, which takes the
- * writer PLC_IMAGE_SLOTS - 2 publications.
- *
- * Inputs are copied in at a cycle's start, outputs out at its end. The stamp tells when it was published.
+ * instance; it outlives both. It has one writer at a time and any number of readers; nobody ever waits for
+ * anybody, also if the other one is pre-empted or killed within. The writer fills a slot that is not the
+ * latest and then publishes it. The reader copies the latest and looks whether it was overtaken meanwhile,
+ * which takes the writer PLC_IMAGE_SLOTS - 2 publications. The stamp tells when it was published. Inputs are
+ * copied in at a cycle's start, outputs out at its end.
  *
  * The dead-man word tells what the writer does, also after its end: plc_image_state(). An instance has a safe
  * image beside its outputs ([SysMem] Linux.Area.n.SafeState). While no task drives the outputs,
  * plc_image_read gives the safe image: after a stop, a fault, a hit of a watchdog, and the end of the
  * process. The instance tells all of them but its own SIGKILL, which the manager tells. If there is no
- * manager either, or the instance stands still, nobody tells it. Firmware has a limit of its own for that:
+ * manager either, or the instance stands still, nobody tells it. Firmware has a limit of its own for that,
+ * and its own safe state beyond it: plc_image_silence_ns(&outputs).
  *
- *     if (plc_image_silence_ns(&outputs) > limit) ... its own safe state
+ * Firmware can be killed, too. plc_image_write_watched() leaves the inputs that programs see then.
  *
- * The file is a memory of the pool. It is an object like all others once anybody opens it by name there, or
- * the manager has looked, provided that its owner may write the pool.
  * If the file is removed, the next start or plc_image_open makes it anew: see plc_image_gone().
  */
 #ifndef PLC_PROCESS_IMAGE_H
@@ -53,7 +49,6 @@
 extern "C" {
 #endif
 
-/* Whole numbers of 64 bit. */
 typedef long plc_image_i64;
 typedef unsigned long plc_image_u64;
 typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
@@ -72,13 +67,13 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 #define PLC_IMAGE_SHOWS_SAFE 0x100UL
 #define PLC_IMAGE_ONE_CHANGE 0x10000UL
 
-/* The states. */
 #define PLC_IMAGE_STATE_UNTOLD 0u    /* the writer tells none: firmware that writes inputs */
 #define PLC_IMAGE_STATE_RUNNING 1u   /* a cycle has ended since the start */
 #define PLC_IMAGE_STATE_STOPPED 2u   /* or just started, or between single cycles */
 #define PLC_IMAGE_STATE_EXCEPTION 3u /* a fault or a watchdog */
 #define PLC_IMAGE_STATE_HALTED 4u    /* a debugger halts a task that writes it */
 #define PLC_IMAGE_STATE_ENDED 5u     /* the process has ended, in order or not */
+#define PLC_IMAGE_STATE_SILENT 6u    /* told by a reader: no sign of firmware, until its next image */
 
 /* An instance gives a sign every 100 ms. While its tasks rest it is silent when five in a row are missing. */
 #define PLC_IMAGE_SIGN_NS 100000000L
@@ -93,7 +88,7 @@ typedef struct {
   plc_image_u64 size;         /* bytes of one image */
   plc_image_u64 control;      /* the dead-man word */
   plc_image_u64 safe;         /* sequence of the safe image * 256 + its slot; 0: none */
-  plc_image_u64 on_end;       /* 1: the safe image is shown when the writer has ended; 0: no change */
+  plc_image_u64 on_end;       /* the safe image is shown: 1: when the writer has ended, 2: is silent; 0: no */
   plc_image_u64 writer;       /* its process number */
   plc_image_i64 heartbeat_ns; /* CLOCK_MONOTONIC, its last sign */
   plc_image_u64 latest;       /* sequence of the latest image * 256 + its slot; 0: none yet */
@@ -120,11 +115,9 @@ typedef struct {
 
 #define PLC_IMAGE_READ 0
 #define PLC_IMAGE_WRITE 1 /* and nobody else, as long as it is open: the kernel ends it with the process */
-
-/* The results of plc_image_read. */
-#define PLC_IMAGE_OK 0
-#define PLC_IMAGE_NONE 1 /* nothing was written yet */
-#define PLC_IMAGE_BUSY 2 /* overtaken each time, or overwritten by a stranger: keep what you have */
+#define PLC_IMAGE_OK 0    /* of plc_image_read: this, or */
+#define PLC_IMAGE_NONE 1  /* nothing was written yet */
+#define PLC_IMAGE_BUSY 2  /* overtaken each time, or overwritten by a stranger: keep what you have */
 #define PLC_IMAGE_ATTEMPTS 4
 
 static __inline__ unsigned long plc_image_stride(unsigned int size) {
@@ -224,30 +217,29 @@ static __inline__ unsigned int plc_image_state(const plc_image* image) {
   return (unsigned int)(plc_image_control(image) & PLC_IMAGE_STATE);
 }
 
-/* Copies the latest image, whatever is shown: for the tasks of the writer. Otherwise as plc_image_read. */
-static __inline__ int plc_image_read_latest(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
+static __inline__ int plc_image_read_of(const plc_image* image, plc_image_u64 safe_if, void* bytes,
+                                        plc_image_i64* stamp_ns) {
   int attempt;
   for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
-    const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE);
-    if (latest == 0) return PLC_IMAGE_NONE;
-    if (plc_image_copy(image, latest, bytes, stamp_ns)) return PLC_IMAGE_OK;
-  }
-  return PLC_IMAGE_BUSY;
-}
-
-/* Copies the image that is shown to `bytes`, image->size of them: the latest, or the safe one. PLC_IMAGE_...;
- * `stamp_ns` may be null. Unless it says PLC_IMAGE_OK, what is in `bytes` may be half of another image. A few
- * attempts, then it gives up: real-time. */
-static __inline__ int plc_image_read(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
-  int attempt;
-  for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
-    const int safe = (plc_image_control(image) & PLC_IMAGE_SHOWS_SAFE) != 0;
+    const int safe = safe_if != 0 && (plc_image_control(image) & safe_if) != 0;
     const plc_image_u64 shown =
         __atomic_load_n(safe ? &image->header->safe : &image->header->latest, __ATOMIC_ACQUIRE);
     if (shown == 0) return PLC_IMAGE_NONE;
     if (plc_image_copy(image, shown, bytes, stamp_ns)) return PLC_IMAGE_OK;
   }
   return PLC_IMAGE_BUSY;
+}
+
+/* Copies the latest image, whatever is shown: for tasks of the writer. Otherwise as plc_image_read. */
+static __inline__ int plc_image_read_latest(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
+  return plc_image_read_of(image, 0, bytes, stamp_ns);
+}
+
+/* Copies the image that is shown to `bytes`, image->size of them: the latest, or the safe one. PLC_IMAGE_...;
+ * `stamp_ns` may be null. Unless it says PLC_IMAGE_OK, what is in `bytes` may be half of another image. A few
+ * attempts, then it gives up: real-time. */
+static __inline__ int plc_image_read(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
+  return plc_image_read_of(image, PLC_IMAGE_SHOWS_SAFE, bytes, stamp_ns);
 }
 
 /* An age that is beyond each limit: nothing was written, or a stranger has written it. */
@@ -301,9 +293,7 @@ static __inline__ plc_image_i64 plc_image_silence_ns(const plc_image* image) {
   return sign_ns > PLC_IMAGE_PATIENCE_NS ? sign_ns - PLC_IMAGE_PATIENCE_NS : 0;
 }
 
-/* For the writer, beside plc_image_write: one process at a time. */
-
-/* Makes `bytes` the safe image. The one before is whole until then. Set-up. */
+/* Makes `bytes` the safe image. The one before is whole until then. One writer at a time. Real-time. */
 static __inline__ void plc_image_set_safe(const plc_image* image, const void* bytes) {
   const plc_image_u64 before = __atomic_load_n(&image->header->safe, __ATOMIC_RELAXED);
   const unsigned int number = (before & 0xffu) == PLC_IMAGE_SLOTS ? PLC_IMAGE_SLOTS + 1u : PLC_IMAGE_SLOTS;
@@ -317,8 +307,7 @@ static __inline__ void plc_image_hold(const plc_image* image, int holds) {
   __atomic_store_n(&image->header->holds, holds ? 1u : 0u, __ATOMIC_RELAXED);
 }
 
-/* Tells a state, and whether the safe image is shown, if nothing was told since `told`. 1: done. Any context.
- */
+/* Tells a state, and whether the safe image is shown, if `told` is still told. 1: done. Any context. */
 static __inline__ int plc_image_tell_since(const plc_image* image, plc_image_u64 told, unsigned int state,
                                            int safe) {
   const plc_image_u64 now = (told / PLC_IMAGE_ONE_CHANGE + 1u) * PLC_IMAGE_ONE_CHANGE |
@@ -327,8 +316,7 @@ static __inline__ int plc_image_tell_since(const plc_image* image, plc_image_u64
                                      __ATOMIC_RELAXED);
 }
 
-/* Tells a state; `safe`: from now on the safe image is shown, until plc_image_resume. Any context, beside
- * plc_image_resume in other threads. */
+/* Tells a state; `safe`: from now on the safe image is shown, until plc_image_resume. Any context. */
 static __inline__ void plc_image_tell(const plc_image* image, unsigned int state, int safe) {
   plc_image_u64 told;
   do {
@@ -345,6 +333,17 @@ static __inline__ void plc_image_resume(const plc_image* image, plc_image_u64 to
 /* A sign of the writer. Any context. */
 static __inline__ void plc_image_beat(const plc_image* image) {
   __atomic_store_n(&image->header->heartbeat_ns, plc_image_now_ns(), __ATOMIC_RELAXED);
+}
+
+/* For firmware, in place of plc_image_write, at least every PLC_IMAGE_SIGN_NS. Once it has given no sign for
+ * PLC_IMAGE_PATIENCE_NS, instances show `at_end` to all readers until the next call. Real-time. */
+static __inline__ void plc_image_write_watched(const plc_image* image, const void* bytes,
+                                               const void* at_end) {
+  plc_image_set_safe(image, at_end);
+  plc_image_write(image, bytes);
+  plc_image_beat(image);
+  __atomic_store_n(&image->header->on_end, 2u, __ATOMIC_RELAXED);
+  plc_image_resume(image, plc_image_control(image)); /* it ends a look of a reader, too */
 }
 
 /* Begins to write, as process number `writer`: before anything is told. Set-up. */
@@ -385,8 +384,7 @@ static __inline__ int plc_image_is_one(const plc_image_header* header, unsigned 
 }
 
 /* The file of an image, `path` having PLC_IMAGE_PATH_SIZE bytes: characters that no file name should have
- * stand there as % and two hexadecimal digits. EINVAL: no name, or control characters in it; ENAMETOOLONG.
- * Set-up.
+ * stand there as % and two hexadecimal digits. EINVAL: no name, or control characters. ENAMETOOLONG. Set-up.
  */
 static __inline__ int plc_image_path(const char* pool, const char* name, char* path) {
   static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
@@ -398,13 +396,12 @@ static __inline__ int plc_image_path(const char* pool, const char* name, char* p
     const unsigned char c = (unsigned char)*name;
     if (end + 4 > PLC_IMAGE_PATH_SIZE) return ENAMETOOLONG;
     if (c < 0x20 || c == 0x7f) return EINVAL;
-    if (c >= 0x80 || strchr(plain, c) != NULL) {
+    if (c >= 0x80 || strchr(plain, c) != NULL)
       path[end++] = *name;
-      path[end] = '\0';
-    } else {
+    else
       end += snprintf(path + end, 4, "%%%02X", (unsigned int)c);
-    }
   }
+  path[end] = '\0';
   return 0;
 }
 
@@ -451,9 +448,15 @@ static __inline__ int plc_image_map(plc_image* image) {
   return plc_image_is_one(image->header, image->size) ? 0 : EPROTO;
 }
 
-/* An instance may have had its outputs in the image of a writer that tells no state. */
+/* Readers go on with the image that the writer before has left for its end, until the first one of this one.
+ * An instance may have had its outputs in the image of a writer that tells no state. */
 static __inline__ void plc_image_tell_nothing(const plc_image* image) {
-  plc_image_u64 told;
+  const unsigned int safe = (unsigned int)(__atomic_load_n(&image->header->safe, __ATOMIC_ACQUIRE) & 0xffu);
+  plc_image_u64 told = plc_image_control(image);
+  const int shown =
+      (told & PLC_IMAGE_SHOWS_SAFE) != 0 || __atomic_load_n(&image->header->on_end, __ATOMIC_RELAXED) != 0;
+  if (shown && safe - PLC_IMAGE_SLOTS < PLC_IMAGE_SAFE_SLOTS)
+    plc_image_write(image, plc_image_slot_at(image, safe) + 1);
   plc_image_take(image, (plc_image_u64)getpid());
   __atomic_store_n(&image->header->on_end, 0u, __ATOMIC_RELAXED);
   plc_image_hold(image, 0);
@@ -462,12 +465,10 @@ static __inline__ void plc_image_tell_nothing(const plc_image* image) {
   } while (told != 0 && !plc_image_tell_since(image, told, PLC_IMAGE_STATE_UNTOLD, 0));
 }
 
-/*
- * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno. EINVAL: no name, or size.
+/* Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno. EINVAL: no name, or size.
  * ENAMETOOLONG. EPROTO: there is another kind of memory, another size, or the version of another header. Then
  * remove the file while no program uses it. EBUSY: it has a writer already. Others: those of open,
- * posix_fallocate and mmap. Set-up.
- */
+ * posix_fallocate and mmap. Set-up. */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
                                      plc_image* image) {
   const int flags = O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
@@ -496,5 +497,4 @@ static __inline__ int plc_image_open(const char* pool, const char* name, unsigne
 }
 #pragma GCC diagnostic pop
 #endif
-
 #endif

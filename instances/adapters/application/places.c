@@ -9,7 +9,8 @@
  * at the begin, and put out if they changed.
  *
  * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last. It is
- * put out if the program's value does. So neither a task that interrupts this one nor firmware is undone.
+ * put out if the program's value does. So neither a task that interrupts this one nor firmware is undone. If
+ * both have changed it in one cycle, the program's value holds.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -89,16 +90,26 @@ static int set_value_if(void* value, unsigned int bytes, unsigned long long befo
   }
 }
 
+/* Others write and read the memory area meanwhile: of such a value they, and this task, see no half. */
+static int is_whole(const struct plchost_place* place, const unsigned char* area) {
+  return (unsigned long)(area + place->offset) % place->bytes == 0;
+}
+
 static unsigned long long load(const struct plchost_place* place, const unsigned char* area) {
   unsigned long long value = 0;
-  memcpy(&value, area + place->offset, place->bytes);
+  if (is_whole(place, area))
+    value = value_at(area + place->offset, place->bytes);
+  else
+    memcpy(&value, area + place->offset, place->bytes);
   return place->bit < 0 ? value : (value >> place->bit) & 1u;
 }
 
 /* Several tasks may have bits in one byte of the memory area. */
 static void store(const struct plchost_place* place, unsigned char* area, unsigned long long value) {
   unsigned char* const byte = area + place->offset;
-  if (place->bit < 0) {
+  if (place->bit < 0 && is_whole(place, area)) {
+    set_value(byte, place->bytes, value);
+  } else if (place->bit < 0) {
     memcpy(byte, &value, place->bytes);
   } else if (value != 0) {
     __atomic_fetch_or(byte, (unsigned char)(1u << place->bit), __ATOMIC_RELAXED);

@@ -61,12 +61,22 @@ Result<void> ModbusProcess::add_devices() {
       PLCHOST_TRY(line->claim(device));
     }
     devices_.push_back(std::make_unique<Device>(device, *line, images_, stop_));
+    show_at_end(*devices_.back());
     if (!device.tcp.empty() && !device.writes.empty()) {
       PLCHOST_TRY_ASSIGN(auto claim, OutputsClaim::take(config_.process.pool, device));
       outputs_.push_back({.claim = std::move(claim), .device = devices_.back().get()});
     }
   }
   return {};
+}
+
+// The same as after an end in order.
+void ModbusProcess::show_at_end(const Device& device) {
+  for (const auto& [name, image] : images_.inputs()) {
+    image->at_end([&device, shown = image.get()](std::span<std::byte> bytes) {
+      device.show(*shown, bytes, MonotonicClock::now(), true);
+    });
+  }
 }
 
 Result<void> ModbusProcess::start_threads() {
@@ -130,6 +140,7 @@ bool ModbusProcess::stop() {
       spdlog::warn("device '{}' has not ended in time: its outputs may stay as they are", device->name());
   }
   show(MonotonicClock::now(), true);
+  for (const auto& [name, image] : images_.inputs()) image->end();
   if (ended) threads_.clear();
   return ended;
 }

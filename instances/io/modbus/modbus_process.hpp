@@ -37,6 +37,7 @@ class ModbusProcess {
   ModbusProcess(const ModbusConfig& config, StopEvent stop, ImageTable images)
       : config_(config), stop_(std::move(stop)), images_(std::move(images)) {}
   [[nodiscard]] Result<void> add_devices();
+  void show_at_end(const Device& device);
   [[nodiscard]] Result<void> start_threads();
   [[nodiscard]] bool join_until(TimePoint deadline);
   /// A device still puts its outputs into their safe state.

@@ -377,6 +377,7 @@ void Instance::beat() {
     const Task& task = tasks_->task(index);
     return task.in_cycle() && !task.trap().parked();
   });
+  for (const std::string& news : host_->areas().watch_inputs()) spdlog::warn("{}", news);
   host_->write_messages();
   if (control_) control_->beat();
   if (values_) values_->beat();

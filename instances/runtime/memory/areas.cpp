@@ -89,6 +89,23 @@ std::vector<std::string> Areas::look_for_losses() {
   return losses;
 }
 
+// The next image of the firmware ends it, also if it was only late.
+std::vector<std::string> Areas::watch_inputs() {
+  std::vector<std::string> news;
+  for (Block& block : blocks_) {
+    if (!block.inputs) continue;
+    tell_silence(*block.inputs);
+    const bool silent = plc_image_state(&*block.inputs) == PLC_IMAGE_STATE_SILENT;
+    if (std::exchange(block.inputs_silent, silent) == silent) continue;
+    news.push_back(
+        fmt::format("{}: {}", block.source,
+                    silent ? "the firmware of these inputs has ended or stands still; they are what it has "
+                             "left for that"
+                           : "the firmware of these inputs writes them again"));
+  }
+  return news;
+}
+
 RTS_RESULT Areas::state(RTS_HANDLE area, Plc_Area_State& state) const noexcept {
   const std::size_t number = number_of(area);
   if (!placed_) return ERR_NOTINITIALIZED;

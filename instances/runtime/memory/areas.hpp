@@ -79,6 +79,9 @@ class Areas {
 
   /// The text about memories that were cut short since the last call; empty: none. Control thread.
   [[nodiscard]] std::vector<std::string> look_for_losses();
+  /// Looks for signs of the firmware of inputs that shows some. Once it gives none, all readers are shown
+  /// what it has left for that. The text about changes since the last call. Every 100 ms; control thread.
+  [[nodiscard]] std::vector<std::string> watch_inputs();
   /// RetainKeeper::problem(). Control thread.
   [[nodiscard]] std::string retain_problem() const { return keeper_ ? keeper_->problem() : std::string(); }
 
@@ -99,6 +102,7 @@ class Areas {
     std::unique_ptr<OutputImage> outputs;        ///< null: no image is published
     std::unique_ptr<OutputRegisters> registers;  ///< null: no outputs of a device
     std::optional<plc_image> inputs;             ///< nothing: no image is read
+    bool inputs_silent = false;                  ///< told in the log
     std::vector<std::byte> initial;
     std::string source;  ///< the setting that placed it, and what it names
     bool loss_told = false;

@@ -252,6 +252,7 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
   block.initial.resize(size);
   if (first_of(planned).is_input()) {
     block.inputs = image_in(block.memory.bytes(), size);
+    tell_silence(*block.inputs);  // before the first cycle
   } else {
     block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
     if (planned.settings == nullptr) return block.outputs->write(block.initial);

@@ -1,12 +1,10 @@
 #include "tests/integration/modbus/modbus_program.hpp"
 
 #include <array>
-#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <fstream>
 #include <sstream>
-#include <thread>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -19,16 +17,6 @@
 #include "tests/support/own_name.hpp"
 
 namespace plchost::testing {
-
-bool eventually(const std::function<bool()>& condition) {
-  using namespace std::chrono_literals;
-  const auto give_up = MonotonicClock::now() + 40s;
-  while (MonotonicClock::now() < give_up) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(5ms);
-  }
-  return condition();
-}
 
 Plant::Plant() : pool_(own_name("modbus")), folder_(std::filesystem::temp_directory_path() / pool_) {
   std::filesystem::create_directories(folder_);
@@ -104,7 +92,10 @@ void Plant::show_safe(unsigned state, std::uint16_t word, bool holds) {
 }
 
 ModbusProgram::ModbusProgram(const Plant& plant, const std::string& config, std::string_view log)
-    : log_file_(plant.file(std::string(log))) {
+    : ModbusProgram(plant.file(std::string(log)), config) {}
+
+ModbusProgram::ModbusProgram(std::string log_file, const std::string& config)
+    : log_file_(std::move(log_file)) {
   posix_spawn_file_actions_t actions{};
   posix_spawn_file_actions_init(&actions);
   for (const int fd : {STDOUT_FILENO, STDERR_FILENO}) {

@@ -61,6 +61,7 @@ class Plant {
 class ModbusProgram {
  public:
   ModbusProgram(const Plant& plant, const std::string& config, std::string_view log = "modbus.log");
+  ModbusProgram(std::string log_file, const std::string& config);
   ~ModbusProgram();
   ModbusProgram(const ModbusProgram&) = delete;
   ModbusProgram& operator=(const ModbusProgram&) = delete;

@@ -1,12 +1,14 @@
 // The server of plchost-modbus and real clients of libmodbus.
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstring>
 #include <memory>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <arpa/inet.h>
@@ -175,6 +177,72 @@ TEST(ModbusServer, ShowsAMemoryAreaWhileItIsThere) {
   make(12, 1, 2);
   EXPECT_TRUE(shows({1, 0, 0, 0, 0, 2}));
   EXPECT_EQ(client.write(0, 3), -2);
+  MemoryFile::remove(name);
+}
+
+// As a C program and firmware, which know no cycle of each other: this thread writes what lies between.
+TEST(ModbusServer, WritesAMemoryAreaAndNothingBesideItsRegisters) {
+  Plant plant;
+  const HeldPort port;
+  const std::string text = fmt::format(R"(
+[[image]]
+name = "line1"
+direction = "memory"
+size = 32
+[server]
+listen = "{}"
+[[server.map]]
+kind = "holding_register"
+address = 0
+count = 8
+image = "line1"
+order = "abcd"
+writable = true
+[[server.map]]
+kind = "coil"
+address = 0
+count = 64
+image = "line1"
+offset = 20
+writable = true
+)",
+                                       port.address());
+  const std::string name = pool_memory_name(plant.pool(), "line1");
+  const ModbusProgram sut(plant, plant.write(text));
+  const Client client(port);
+  ASSERT_TRUE(client.connected()) << sut.log();
+  EXPECT_EQ(client.write(0, 3), -4) << "it is not there yet";
+  const MemoryFile memory = MemoryFile::create(name, 32).value();
+  auto* const words = reinterpret_cast<std::uint16_t*>(memory.bytes().data());
+  ASSERT_TRUE(eventually([&] { return client.write(0, 3) == 0; }));
+  EXPECT_EQ(words[1], 3) << "the low register of 32 bit has the high word";
+  // Registers 1 and 2 are words 0 and 3. Words 1 and 2 and the bits beside the coil are this thread's.
+  std::atomic<bool> stop{false};
+  int lost = 0;
+  std::thread program([&] {
+    auto* const byte = reinterpret_cast<std::uint8_t*>(memory.bytes().data() + 20);
+    for (std::uint16_t value = 1; !stop; ++value) {
+      __atomic_store_n(&words[1], value, __ATOMIC_RELAXED);
+      __atomic_store_n(&words[2], value, __ATOMIC_RELAXED);
+      __atomic_fetch_xor(byte, 2, __ATOMIC_RELAXED);
+      const bool on = (__atomic_load_n(byte, __ATOMIC_RELAXED) & 2) != 0;
+      std::this_thread::yield();
+      if (__atomic_load_n(&words[1], __ATOMIC_RELAXED) != value) ++lost;
+      if (__atomic_load_n(&words[2], __ATOMIC_RELAXED) != value) ++lost;
+      if (((__atomic_load_n(byte, __ATOMIC_RELAXED) & 2) != 0) != on) ++lost;
+    }
+  });
+  for (std::uint16_t value = 1; value <= 1000; ++value) {
+    const std::array<std::uint16_t, 2> both = {value, static_cast<std::uint16_t>(value + 1)};
+    EXPECT_EQ(modbus_write_registers(client.context(), 1, 2, both.data()), 2);
+    EXPECT_EQ(__atomic_load_n(&words[0], __ATOMIC_RELAXED), value);
+    EXPECT_EQ(__atomic_load_n(&words[3], __ATOMIC_RELAXED), value + 1);
+    EXPECT_EQ(modbus_write_bit(client.context(), 0, value % 2), 1);
+    EXPECT_EQ(std::to_integer<int>(memory.bytes()[20]) & 1, value % 2);
+  }
+  stop = true;
+  program.join();
+  EXPECT_EQ(lost, 0);
   MemoryFile::remove(name);
 }
 

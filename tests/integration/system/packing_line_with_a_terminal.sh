@@ -90,6 +90,7 @@ for compiler in "${compilers[@]}"; do
   kill -KILL "$modbus"
   wait "$modbus" 2>/dev/null || true
   until_true 40 motor_is FALSE
+  until_true 40 is quality 0
   tell speed 100
   start_modbus
   until_true 40 shows "motor 1, fault 0, carton 0, speed 100"

@@ -191,6 +191,64 @@ TEST(OutputImage, OfTasksWithoutBytesOfTheirOwnHasWhatEachHasChanged) {
   EXPECT_EQ(high.bytes()[1], std::byte{0x11});
 }
 
+/// An image that firmware writes with what is shown at its end.
+struct WatchedImage : ::testing::Test {
+  void write(std::uint64_t value, std::uint64_t at_end) const {
+    plc_image_write_watched(&sut, &value, &at_end);
+  }
+  void be_silent(plc_image_i64 for_ns) const { sut.header->heartbeat_ns = plc_image_now_ns() - for_ns; }
+  [[nodiscard]] std::uint64_t shown() const {
+    std::uint64_t value = 0;
+    EXPECT_EQ(plc_image_read(&sut, &value, nullptr), PLC_IMAGE_OK);
+    return value;
+  }
+  static constexpr plc_image_i64 kTooLong = PLC_IMAGE_PATIENCE_NS + 1'000'000;
+  Memory memory{8};
+  const plc_image sut = image_in(memory.bytes(), 8);
+};
+
+TEST_F(WatchedImage, IsThatOfTheEndOnceItsWriterIsSilent) {
+  write(1, 101);
+  tell_silence(sut);
+  EXPECT_EQ(shown(), 1U);
+  be_silent(kTooLong);
+  EXPECT_EQ(shown(), 1U) << "nobody has looked";
+  tell_silence(sut);
+  EXPECT_EQ(shown(), 101U);
+  EXPECT_EQ(plc_image_state(&sut), PLC_IMAGE_STATE_SILENT);
+  write(2, 102);
+  EXPECT_EQ(shown(), 2U) << "it was only late";
+  EXPECT_EQ(plc_image_state(&sut), PLC_IMAGE_STATE_RUNNING);
+  be_silent(kTooLong);
+  tell_silence(sut);
+  EXPECT_EQ(shown(), 102U);
+}
+
+// A SIGSTOP of an instance is no end of its outputs, and firmware may write only what has changed.
+TEST_F(WatchedImage, IsNoneOfAWriterThatDoesNotSaySo) {
+  const std::uint64_t value = 1;
+  plc_image_write(&sut, &value);
+  be_silent(kTooLong);
+  tell_silence(sut);
+  EXPECT_EQ(plc_image_state(&sut), PLC_IMAGE_STATE_UNTOLD);
+  plc_image_set_safe(&sut, &value);
+  plc_image_tell(&sut, PLC_IMAGE_STATE_RUNNING, 0);
+  for (const unsigned on_end : {0U, 1U}) {
+    sut.header->on_end = on_end;
+    tell_silence(sut);
+    EXPECT_EQ(plc_image_state(&sut), PLC_IMAGE_STATE_RUNNING);
+  }
+}
+
+TEST_F(WatchedImage, OfAnEndThatWasToldIsNotToldAnew) {
+  write(1, 101);
+  plc_image_tell(&sut, PLC_IMAGE_STATE_ENDED, 1);
+  be_silent(kTooLong);
+  tell_silence(sut);
+  EXPECT_EQ(plc_image_state(&sut), PLC_IMAGE_STATE_ENDED);
+  EXPECT_EQ(shown(), 101U);
+}
+
 TEST(InputView, KeepsTheImageThatItHadWhileTheWriterIsInTheWay) {
   Memory memory(8);
   const plc_image source = image_in(memory.bytes(), 8);
@@ -255,6 +313,38 @@ TEST_F(OpenedImage, IsMadeByWhoeverComesFirstAndHasOneWriter) {
   EXPECT_NE(plc_image_gone(&reader, pool.c_str(), "io"), 0);
   plc_image_close(&reader);
   plc_image_close(&writer);
+}
+
+// It is killed, and the next one comes before anybody has looked, or after that.
+TEST_F(OpenedImage, OfAWriterThatEndedSuddenlyStaysThatOfItsEndUntilTheNextOneWrites) {
+  plc_image reader;
+  ASSERT_EQ(plc_image_open(pool.c_str(), "io", 8, PLC_IMAGE_READ, &reader), 0);
+  const auto shown = [&] {
+    std::uint64_t value = 0;
+    EXPECT_EQ(plc_image_read(&reader, &value, nullptr), PLC_IMAGE_OK);
+    return value;
+  };
+  for (const bool told : {false, true}) {
+    plc_image writer;
+    ASSERT_EQ(plc_image_open(pool.c_str(), "io", 8, PLC_IMAGE_WRITE, &writer), 0);
+    const std::uint64_t good = 1;
+    const std::uint64_t at_end = 101;
+    plc_image_write_watched(&writer, &good, &at_end);
+    plc_image_close(&writer);
+    EXPECT_EQ(shown(), good);
+    if (told) {
+      reader.header->heartbeat_ns -= 2 * PLC_IMAGE_PATIENCE_NS;
+      tell_silence(reader);
+      EXPECT_EQ(shown(), at_end);
+    }
+    ASSERT_EQ(plc_image_open(pool.c_str(), "io", 8, PLC_IMAGE_WRITE, &writer), 0);
+    EXPECT_EQ(shown(), at_end);
+    EXPECT_EQ(plc_image_state(&reader), PLC_IMAGE_STATE_UNTOLD);
+    plc_image_write(&writer, &good);
+    EXPECT_EQ(shown(), good);
+    plc_image_close(&writer);
+  }
+  plc_image_close(&reader);
 }
 
 // As of a maker that was told that there is no memory. With none, each access to it would be a SIGBUS.

@@ -114,6 +114,16 @@ writable = true
   EXPECT_TRUE(config->server->maps[0].writable);
 }
 
+TEST(ModbusConfig, LetsClientsWriteInputsAndMemoryAreas) {
+  const std::string memory = "[[image]]\nname = \"line1\"\ndirection = \"memory\"\nsize = 8\n";
+  for (const char* image : {"t.in", "line1"}) {
+    EXPECT_EQ(refused(memory +
+                      "[server]\n[[server.map]]\nkind = \"coil\"\naddress = 0\nwritable = true\nimage = \"" +
+                      image + "\"\n"),
+              "accepted");
+  }
+}
+
 TEST(ModbusConfig, TellsAllErrorsWithLineAndKey) {
   const auto config = parse(R"([[device]]
 name = "valves"

@@ -53,20 +53,29 @@ void check_kind(SectionReader& reader, const RegisterMap& map, MapUse use) {
   }
 }
 
-void check_direction(SectionReader& reader, const ImageConfig& image, const RegisterMap& map, MapUse use) {
-  const bool fills = use == MapUse::device_read || map.writable;
-  const std::string_view is = image.direction == ImageDirection::memory ? "a memory area"
-                              : fills                                   ? "an output image"
-                                                                        : "an input image";
-  if (fills && image.direction != ImageDirection::input) {
-    reader.problem("image",
-                   fmt::format("'{}' is {}, which the PLC writes; allowed is an image with direction = "
-                               "\"input\"",
-                               shown(image.name), is));
+std::string_view name_of(ImageDirection direction) noexcept {
+  switch (direction) {
+    case ImageDirection::input:
+      return "an input image";
+    case ImageDirection::output:
+      return "an output image";
+    case ImageDirection::memory:
+      break;
   }
-  if (use == MapUse::device_write && image.direction != ImageDirection::output) {
-    reader.problem("image", fmt::format("'{}' is {}; allowed is an image with direction = \"output\"",
-                                        shown(image.name), is));
+  return "a memory area";
+}
+
+void check_direction(SectionReader& reader, const ImageConfig& image, const RegisterMap& map, MapUse use) {
+  const auto refuse = [&](std::string_view why, std::string_view allowed) {
+    reader.problem("image", fmt::format("'{}' is {}{}; allowed is an image with direction = {}",
+                                        shown(image.name), name_of(image.direction), why, allowed));
+  };
+  if (use == MapUse::device_read && image.direction != ImageDirection::input) {
+    refuse(", which the PLC writes", "\"input\"");
+  } else if (use == MapUse::device_write && image.direction != ImageDirection::output) {
+    refuse("", "\"output\"");
+  } else if (map.writable && image.direction == ImageDirection::output) {
+    refuse(": the PLC puts all of its bytes out anew in each cycle", "\"input\" or \"memory\"");
   }
 }
 

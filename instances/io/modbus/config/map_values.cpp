@@ -20,11 +20,11 @@ std::uint16_t in_order(RegisterOrder order, std::uint16_t value) noexcept {
   return swapped ? static_cast<std::uint16_t>(value << 8U | value >> 8U) : value;
 }
 
+}  // namespace
+
 std::size_t byte_of(const RegisterMap& map, std::size_t index) noexcept {
   return map.offset + word_of(map.order, index) * sizeof(std::uint16_t);
 }
-
-}  // namespace
 
 void put_registers(const RegisterMap& map, std::uint32_t first, std::span<const std::uint16_t> registers,
                    std::span<std::byte> image) noexcept {

@@ -23,6 +23,9 @@ void put_bits(const RegisterMap& map, std::uint32_t first, std::span<const std::
 void get_bits(const RegisterMap& map, std::uint32_t first, std::span<const std::byte> image,
               std::span<std::uint8_t> bits) noexcept;
 
+/// The byte of register `index` of the map in its image.
+[[nodiscard]] std::size_t byte_of(const RegisterMap& map, std::size_t index) noexcept;
+
 /// All values of the map become 0.
 void put_zeros(const RegisterMap& map, std::span<std::byte> image) noexcept;
 

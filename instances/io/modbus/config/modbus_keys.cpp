@@ -208,9 +208,10 @@ constexpr std::array kMapKeys = {
          .meaning = "registers or bits. A device is asked for at most 125 registers or 2000 bits by "
                     "one map, and written 123 or 1968"}),
     key<&RegisterMap::image, RequiredKey<TextKey<ImageNameRule>>>(
-        kEachMap, {.name = "image",
-                   .meaning = "an input image for `[[device.read]]` and what is `writable`, an output image "
-                              "for `[[device.write]]`"}),
+        kEachMap,
+        {.name = "image",
+         .meaning = "an input image for `[[device.read]]`, an output image for `[[device.write]]`, an "
+                    "input image or a memory if `writable`"}),
     key<&RegisterMap::offset, OffsetKey>(
         kEachMap, {.name = "offset", .meaning = "first byte in the image. A register has two"}),
     key<&RegisterMap::bit, NumberKey<0, 7>>(
@@ -245,7 +246,7 @@ constexpr std::array kServerMapKeys = {
     key<&RegisterMap::writable, TruthKey>(
         "[[server.map]]", {.name = "writable",
                            .meaning = "clients may write it; for coils and holding registers in an input "
-                                      "image"}),
+                                      "image or a [memory area](#server)"}),
 };
 
 // Beside the keys: the line, and the tables below a section.

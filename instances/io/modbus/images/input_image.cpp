@@ -26,8 +26,19 @@ Result<void> InputImage::repair() {
     return std::unexpected(std::move(opened).error());
   }
   image_ = std::move(*opened);
-  plc_image_write(&image_.image(), bytes_.data());
+  publish();
   return {};
+}
+
+void InputImage::publish() {
+  std::ranges::copy(bytes_, ended_.begin());
+  for (const AtEnd& change : at_end_) change(ended_);
+  plc_image_write_watched(&image_.image(), bytes_.data(), ended_.data());
+}
+
+void InputImage::end() {
+  const std::lock_guard lock(mutex_);
+  plc_image_tell(&image_.image(), PLC_IMAGE_STATE_ENDED, 1);
 }
 
 }  // namespace plchost::modbus

@@ -1,8 +1,10 @@
 #include "instances/io/modbus/images/memory_image.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 
+#include "instances/io/modbus/config/map_values.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
 
@@ -27,7 +29,70 @@ void copy(std::span<const std::byte> from, std::span<std::byte> to) noexcept {
   }
 }
 
+template <class Value>
+void store(const std::byte* from, std::byte* to) noexcept {
+  Value value{};
+  std::memcpy(&value, from, sizeof value);
+  __atomic_store_n(reinterpret_cast<Value*>(to), value, __ATOMIC_RELAXED);
+}
+
+// At most `bytes`, from 2 on, of which no reader sees a half. Their number.
+std::size_t store_whole(const std::byte* from, std::byte* to, std::size_t bytes) noexcept {
+  const auto at = reinterpret_cast<std::uintptr_t>(to);
+  if (bytes >= sizeof(std::uint64_t) && at % sizeof(std::uint64_t) == 0) {
+    store<std::uint64_t>(from, to);
+    return sizeof(std::uint64_t);
+  }
+  if (bytes >= sizeof(std::uint32_t) && at % sizeof(std::uint32_t) == 0) {
+    store<std::uint32_t>(from, to);
+    return sizeof(std::uint32_t);
+  }
+  if (at % sizeof(std::uint16_t) == 0) {
+    store<std::uint16_t>(from, to);
+  } else {
+    store<std::uint8_t>(from, to);
+    store<std::uint8_t>(from + 1, to + 1);
+  }
+  return sizeof(std::uint16_t);
+}
+
 }  // namespace
+
+// Words of a value of 32 bit may lie the other way round, and only one of the two be written.
+bool MemoryImage::put_registers(const RegisterMap& map, std::uint32_t first,
+                                std::span<const std::uint16_t> registers) {
+  const std::lock_guard lock(mutex_);
+  if (!refresh()) return false;
+  modbus::put_registers(map, first, registers, bytes_);
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < registers.size(); ++i) places.push_back(byte_of(map, first + i));
+  std::ranges::sort(places);
+  for (std::size_t i = 0; i < places.size();) {
+    std::size_t run = 1;
+    while (i + run < places.size() && places[i + run] == places[i] + run * sizeof(std::uint16_t)) ++run;
+    const std::size_t at = places[i];
+    i += store_whole(bytes_.data() + at, memory_->bytes().data() + at, run * sizeof(std::uint16_t)) /
+         sizeof(std::uint16_t);
+  }
+  return !memory_->lost();
+}
+
+bool MemoryImage::put_bits(const RegisterMap& map, std::uint32_t first, std::span<const std::uint8_t> bits) {
+  const std::lock_guard lock(mutex_);
+  if (!refresh()) return false;
+  std::uint64_t at = first_bit(map) + first;
+  for (const std::uint8_t bit : bits) {
+    auto* const byte = reinterpret_cast<std::uint8_t*>(memory_->bytes().data() + at / 8);
+    const auto mask = static_cast<std::uint8_t>(1U << (at % 8));
+    if (bit != 0) {
+      __atomic_fetch_or(byte, mask, __ATOMIC_RELAXED);
+    } else {
+      __atomic_fetch_and(byte, static_cast<std::uint8_t>(~mask), __ATOMIC_RELAXED);
+    }
+    ++at;
+  }
+  return !memory_->lost();
+}
 
 bool MemoryImage::refresh() {
   repair();
@@ -41,8 +106,7 @@ void MemoryImage::repair() {
   if (memory_ && !memory_->lost() && now < looked_at_ + kSameFor) return;
   looked_at_ = now;
   const auto owners = [this](uid_t user) { return may_own_memory(pool_, user); };
-  auto opened =
-      MemoryFile::open(pool_memory_name(pool_, name_), bytes_.size(), MemoryFile::Access::read_only, owners);
+  auto opened = MemoryFile::open(pool_memory_name(pool_, name_), bytes_.size(), access_, owners);
   if (opened && opened->guarded()) {
     if (!memory_ || memory_->lost() || !memory_->same_file(*opened)) memory_ = std::move(*opened);
     tell_again_ = {};

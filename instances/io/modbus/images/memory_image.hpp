@@ -9,17 +9,29 @@
 #include <utility>
 #include <vector>
 
+#include "instances/io/modbus/config/modbus_config.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
 
 namespace plchost::modbus {
 
 /// A memory area of an instance that lies in the pool, as it is at the moment: tasks write it whenever they
-/// like. Of values with an address that is a multiple of their size no half is seen. Any thread.
+/// like. Of values with an address that is a multiple of their size no half is seen, in either direction. Any
+/// thread.
 class MemoryImage {
  public:
   MemoryImage(std::string pool, std::string name, std::uint32_t size)
       : pool_(std::move(pool)), name_(std::move(name)), bytes_(size) {}
+
+  /// It will be written, too. Set-up.
+  void make_writable() noexcept { access_ = MemoryFile::Access::read_write; }
+
+  /// Writes values of a map that lies in it, and no bit beside them: tasks may write there meanwhile.
+  /// `first`: of them, within the map. False: as look().
+  [[nodiscard]] bool put_registers(const RegisterMap& map, std::uint32_t first,
+                                   std::span<const std::uint16_t> registers);
+  [[nodiscard]] bool put_bits(const RegisterMap& map, std::uint32_t first,
+                              std::span<const std::uint8_t> bits);
 
   /// Calls `look` with the bytes. False: there is no such memory, or it is shorter; the log says why.
   template <class Look>
@@ -36,6 +48,7 @@ class MemoryImage {
 
   std::string pool_;
   std::string name_;
+  MemoryFile::Access access_ = MemoryFile::Access::read_only;
   std::mutex mutex_;
   std::optional<MemoryFile> memory_;
   std::vector<std::byte> bytes_;

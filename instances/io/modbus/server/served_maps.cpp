@@ -11,6 +11,7 @@ ServedMaps::ServedMaps(const ServerConfig& config, const ImageTable& images)
                      .input = images.input(map.image),
                      .output = images.output(map.image),
                      .memory = images.memory(map.image)});
+    if (map.writable && maps_.back().memory != nullptr) maps_.back().memory->make_writable();
   }
 }
 
@@ -61,20 +62,30 @@ bool ServedMaps::read_part(const Served& served, const Part& part, MapValues& va
   return fresh;
 }
 
-void ServedMaps::write(const Request& request, MapValues& values) const {
+bool ServedMaps::write(const Request& request, MapValues& values) const {
+  bool written = true;
   for (const Served& served : maps_) {
     const Part part = part_of(*served.map, request);
     if (part.count == 0 || !served.map->writable) continue;
-    const std::uint32_t end = part.first_of_request + part.count;
-    served.input->update([&](std::span<std::byte> bytes) {
-      if (is_bit(request.kind)) {
-        put_bits(*served.map, part.first_of_map, values.bits(end).subspan(part.first_of_request), bytes);
-      } else {
-        put_registers(*served.map, part.first_of_map, values.registers(end).subspan(part.first_of_request),
-                      bytes);
-      }
-    });
+    written = write_part(served, part, values) && written;
   }
+  return written;
+}
+
+bool ServedMaps::write_part(const Served& served, const Part& part, MapValues& values) {
+  const RegisterMap& map = *served.map;
+  const std::uint32_t end = part.first_of_request + part.count;
+  if (is_bit(map.kind)) {
+    const auto bits = values.bits(end).subspan(part.first_of_request);
+    if (served.memory != nullptr) return served.memory->put_bits(map, part.first_of_map, bits);
+    served.input->update([&](std::span<std::byte> bytes) { put_bits(map, part.first_of_map, bits, bytes); });
+  } else {
+    const auto registers = values.registers(end).subspan(part.first_of_request);
+    if (served.memory != nullptr) return served.memory->put_registers(map, part.first_of_map, registers);
+    served.input->update(
+        [&](std::span<std::byte> bytes) { put_registers(map, part.first_of_map, registers, bytes); });
+  }
+  return true;
 }
 
 bool answer(modbus_t* context, const ServedMaps& maps, std::span<const std::uint8_t> frame) {
@@ -98,7 +109,9 @@ bool answer(modbus_t* context, const ServedMaps& maps, std::span<const std::uint
   // Before the answer: a client that has it may look at the image.
   if (request->writes) {
     take_written(frame, *request, values);
-    maps.write(*request, values);
+    if (!maps.write(*request, values)) {
+      return modbus_reply_exception(context, frame.data(), MODBUS_EXCEPTION_SLAVE_OR_SERVER_FAILURE) > 0;
+    }
   }
   return modbus_reply(context, frame.data(), static_cast<int>(frame.size()), &mapping) > 0;
 }

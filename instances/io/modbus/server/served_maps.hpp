@@ -24,8 +24,8 @@ class ServedMaps {
   /// The values of these registers, or the number of an exception. A request that writes needs maps that are
   /// writable.
   [[nodiscard]] std::expected<void, std::uint8_t> read(const Request& request, MapValues& values) const;
-  /// After a read() of the same request.
-  void write(const Request& request, MapValues& values) const;
+  /// After a read() of the same request. False: a memory area has gone since.
+  [[nodiscard]] bool write(const Request& request, MapValues& values) const;
 
  private:
   struct Served {
@@ -41,6 +41,7 @@ class ServedMaps {
     std::uint32_t count;
   };
   [[nodiscard]] static Part part_of(const RegisterMap& map, const Request& request) noexcept;
+  [[nodiscard]] static bool write_part(const Served& served, const Part& part, MapValues& values);
   [[nodiscard]] bool read_part(const Served& served, const Part& part, MapValues& values) const;
 
   Duration silent_after_;
