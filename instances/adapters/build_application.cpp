@@ -49,7 +49,7 @@ class Build {
       for (const iec::Resource& resource : configuration().resources) make(resource);
       if (context_.good()) publish();
     }
-    projects_.restore(context_.report.problems, context_.report.remarks);
+    context_.projects.restore(context_.report.problems, context_.report.remarks);
     return std::move(context_.report);
   }
 
@@ -98,7 +98,7 @@ class Build {
     auto read = read_text_file(file, kMaxSource);
     if (!context_.has(read)) return;
     iec::Source source{file, std::move(read->text)};
-    if (plcopen::is_project_file(file)) source = projects_.take(source, context_.report.problems);
+    if (plcopen::is_project_file(file)) source = context_.projects.take(source, context_.report.problems);
     context_.sources.push_back(std::move(source));
     identities_.push_back(read->identity);
   }
@@ -121,7 +121,7 @@ class Build {
 
   bool choose() {
     translator_ = choose_translator(context_);
-    if (translator_ != nullptr) projects_.fit_lengths(context_.sources, translator_->compiler());
+    if (translator_ != nullptr) context_.projects.fit_lengths(context_.sources, translator_->compiler());
     return translator_ != nullptr;
   }
 
@@ -142,7 +142,7 @@ class Build {
       context_.fail({configuration().place, "this CONFIGURATION runs no program"});
     }
     if (context_.good()) read_task_file();
-    if (context_.good()) projects_.add_events(context_.project.configurations.front());
+    if (context_.good()) context_.projects.add_events(context_.project.configurations.front());
     return context_.good();
   }
   [[nodiscard]] std::string names_of_sources() const {
@@ -257,7 +257,6 @@ class Build {
 
   const BuildOrder& order_;
   BuildContext context_;
-  plcopen::ProjectSources projects_;  // those that are PLCopen XML
   std::unique_ptr<Translator> translator_;
   std::vector<FileIdentity> identities_;  // of all files that are read
   std::vector<OutputFile> outputs_;

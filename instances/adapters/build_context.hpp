@@ -12,6 +12,7 @@
 #include "instances/adapters/c_compiler.hpp"
 #include "instances/adapters/compiler_output.hpp"
 #include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/plcopen/structured_text.hpp"
 #include "instances/adapters/run_program.hpp"
 #include "instances/adapters/work_folder.hpp"
 
@@ -26,6 +27,7 @@ class BuildContext {
   const BuildOrder& order;
   BuildReport report;
   std::vector<iec::Source> sources;
+  plcopen::ProjectSources projects;  ///< those of the sources that are PLCopen XML
   iec::Project project;
 
   void fail(iec::SourceProblem problem) { report.problems.push_back(std::move(problem)); }

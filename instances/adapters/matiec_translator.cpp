@@ -2,6 +2,7 @@
 #include <cstring>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "instances/adapters/iec/pragmas.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "instances/adapters/matiec/complements.hpp"
+#include "instances/adapters/matiec/constant_bounds.hpp"
 #include "instances/adapters/matiec/declared.hpp"
 #include "instances/adapters/matiec/explained.hpp"
 #include "instances/adapters/matiec/glue.hpp"
@@ -18,6 +20,7 @@
 #include "instances/adapters/matiec/initial_values.hpp"
 #include "instances/adapters/matiec/located.hpp"
 #include "instances/adapters/matiec/loops.hpp"
+#include "instances/adapters/matiec/references.hpp"
 #include "instances/adapters/matiec/refused.hpp"
 #include "instances/adapters/matiec/statements.hpp"
 #include "instances/adapters/matiec/temporaries.hpp"
@@ -54,6 +57,8 @@ class MatiecTranslator : public Translator {
       std::ranges::move(refused, std::back_inserter(context_.report.problems));
     }
     if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
+    matiec::resolve_bounds(context_.project);
+    matiec::mark_references(context_.project);
     // Errors of the sources count more than a configuration that is missing.
     if (context_.good() && context_.project.configurations.empty() &&
         matiec::find_compiler(context_.order.matiec)) {
@@ -146,6 +151,7 @@ class MatiecTranslator : public Translator {
   bool run() {
     namespace fs = std::filesystem;
     std::vector<std::string> command{fs::absolute(compiler_.program), "-f", "-p", "-l"};
+    if (!add_options(command)) return false;
     command.insert(command.end(), {"-O", "l", "-I", fs::absolute(compiler_.library), "-T", ".",
                                    std::string(matiec::kJoinedFile)});
     const auto end = context_.run("iec2c", command, context_.order.translate_limit);
@@ -171,6 +177,26 @@ class MatiecTranslator : public Translator {
       context_.fail("iec2c has failed:" + first_lines(end->output));
     }
     return context_.good() && context_.has(context_.folder().check_room());
+  }
+
+  // Of references and of bounds that are constants, if this iec2c knows them. References take the words REF,
+  // DREF and NULL from programs without any.
+  bool add_options(std::vector<std::string>& command) {
+    const auto help = context_.run("iec2c", {command.front(), "-h"}, context_.order.translate_limit);
+    if (!help) return false;
+    std::ranges::move(matiec::known_options(help->output, "a"), std::back_inserter(command));
+    const iec::SourcePlace reference = matiec::first_reference(context_.sources);
+    if (reference.file.empty()) return true;
+    const auto options = matiec::known_options(help->output, "rR");
+    if (options.empty())
+      context_.fail({reference, "REF_TO: this iec2c knows no references; use a newer MATIEC, or STruC++"});
+    std::ranges::copy(options, std::back_inserter(command));
+    const std::set<std::string> library = matiec::names_of_library(compiler_.library);
+    std::ranges::move(
+        matiec::references_to_blocks(context_.project, context_.sources,
+                                     [&](const std::string& name) { return library.contains(name); }),
+        std::back_inserter(context_.report.problems));
+    return context_.good();
   }
 
   bool read_located() {
@@ -199,9 +225,10 @@ class MatiecTranslator : public Translator {
   [[nodiscard]] std::optional<std::string> read_code() {
     const auto code = context_.folder().read(kCode);
     if (!context_.has(code)) return std::nullopt;
-    return matiec::with_marked_initial_values(matiec::with_temporary_values(
-        iec::with_ended_escapes(matiec::with_narrow_complements(matiec::with_first_turns(*code)), kTextMacro),
-        context_.project));
+    const std::string mended =
+        matiec::with_reference_assignments(matiec::with_narrow_complements(matiec::with_first_turns(*code)));
+    return matiec::with_marked_initial_values(
+        matiec::with_temporary_values(iec::with_ended_escapes(mended, kTextMacro), context_.project));
   }
 
   bool drop_directives() {
@@ -214,7 +241,9 @@ class MatiecTranslator : public Translator {
   bool instrument() {
     const auto code = read_code();
     if (!code) return false;
-    auto made = matiec::with_statements(*code, *joined_, context_.project);
+    auto made = matiec::with_statements(
+        *code, *joined_, context_.project,
+        [this](std::string_view file, unsigned line) { return context_.projects.line_in_file(file, line); });
     for (iec::DebugPou& pou : made.pous) {
       if (const iec::Pou* const known = context_.project.pou(pou.name)) pou.name = known->name;
     }

@@ -108,13 +108,18 @@ class StrucppTranslator : public Translator {
   }
 
  private:
-  // The C++ has directives #line with the names that the compiler was given.
-  [[nodiscard]] std::optional<FoundSource> source_of(const std::string& file, unsigned line) const {
+  // By the name that the compiler was given.
+  [[nodiscard]] const iec::Source* source_named(std::string_view file) const {
     for (std::size_t i = 0; i < context_.sources.size(); ++i) {
-      const std::string& source = context_.sources[i].file;
-      if (file == name_for_compiler(source, i)) return FoundSource{{source, line, 0}};
+      if (file == name_for_compiler(context_.sources[i].file, i)) return &context_.sources[i];
     }
-    return std::nullopt;
+    return nullptr;
+  }
+  // The C++ has directives #line with those names, and with lines of the user's files.
+  [[nodiscard]] std::optional<FoundSource> source_of(const std::string& file, unsigned line) const {
+    const iec::Source* const source = source_named(file);
+    if (source == nullptr) return std::nullopt;
+    return FoundSource{{source->file, context_.projects.line_in_source(source->file, line), 0}};
   }
 
   // An online change allows no symbol that exists once in a process. Only g++ makes such, and has this flag.
@@ -130,8 +135,12 @@ class StrucppTranslator : public Translator {
     std::vector<std::string> files = files_;
     files.emplace_back("generated.hpp");
     const auto find_file = [this](std::string_view pou) { return file_of(pou); };
+    const auto find_line = [this](std::string_view file, unsigned line) {
+      const iec::Source* const source = source_named(file);
+      return source == nullptr ? line : context_.projects.line_in_file(source->file, line);
+    };
     return context_.rewrite(files, [&](const std::string& code) {
-      return strucpp::with_files_of_pous(iec::with_ended_escapes(code), find_file);
+      return strucpp::with_files_of_pous(iec::with_ended_escapes(code), find_file, find_line);
     });
   }
   // As the compiler knows it.

@@ -195,9 +195,14 @@ class ProjectReader {
     const std::string type = take(":") ? take_type() : "";
     // The compiler says more of a declaration that cannot be read.
     if (type.empty() && !at_end() && !at(";") && !at("END_VAR")) take();
-    for (std::size_t i = first; i < variables.size(); ++i) variables[i].type = type;
-    while (!at_end() && !at(";") && !at("END_VAR")) take();
+    std::string value;
+    (void)take(":=");
+    while (!at_end() && !at(";") && !at("END_VAR")) value += take().text;
     take(";");
+    for (std::size_t i = first; i < variables.size(); ++i) {
+      variables[i].type = type;
+      if (variables[i].constant) variables[i].value = value;
+    }
   }
   std::string take_type() {
     std::string type;

@@ -21,16 +21,22 @@ inline constexpr std::size_t kMostNested = 32;
 // reads the sources, too, and finds what is wrong in the rest. Names are as they stand in the source; compare
 // them by folded().
 
+/// The types of variables with references begin so.
+inline constexpr std::string_view kReference = "REFERENCE ";
+
 struct Variable {
   enum class Section : unsigned char { input, output, in_out, local, temporary, external, global, other };
   std::string name;
-  std::string type;  ///< "INT", "ARRAY[1..3] OF INT", "STRING(80)": the words of the source, one blank apart
+  /// "INT", "ARRAY[1..3] OF INT", "STRING(80)": the words of the source, one blank apart. Behind kReference,
+  /// if its values have references.
+  std::string type;
   std::string location;  ///< "%IX0.0"; empty: none
   Section section = Section::local;
   bool retain = false;
   bool constant = false;
   SourcePlace place;
   std::string member = {};  ///< its name in the output of STruC++; empty: its own, folded
+  std::string value = {};   ///< of a constant: the words of its initial value, without blanks
 };
 
 struct Pou {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace plchost::iec {
@@ -24,5 +26,9 @@ struct SourceProblem {
 [[nodiscard]] std::string describe(const SourceProblem& problem);
 
 using SourceProblems = std::vector<SourceProblem>;
+
+/// The line of the user's file on which a line of its source stands. PLCopen XML becomes a source whose lines
+/// are others than those of the file.
+using FindLine = std::function<unsigned(std::string_view file, unsigned line)>;
 
 }  // namespace plchost::iec

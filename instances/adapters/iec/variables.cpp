@@ -14,9 +14,6 @@ namespace plchost::iec {
 
 namespace {
 
-/// The types of variables with references begin so.
-constexpr std::string_view kReference = "REFERENCE ";
-
 /// They hold times of a clock that begins anew when the machine does.
 constexpr std::array<std::string_view, 3> kTimers{"TON", "TOF", "TP"};
 constexpr std::array<std::string_view, 22> kElementary{

@@ -83,15 +83,6 @@ void add_pous_in(const fs::path& file, std::set<std::string>& names) {
   }
 }
 
-std::set<std::string> names_of_library(const std::string& library) {
-  std::set<std::string> names;
-  std::error_code none;  // without the folder iec2c says so
-  for (const fs::directory_entry& entry : fs::directory_iterator(library, none)) {
-    if (entry.path().extension() == ".txt") add_pous_in(entry.path(), names);
-  }
-  return names;
-}
-
 // GATE : ( OPEN , CLOSED )
 bool is_enumeration(const iec::DeclaredType& type) {
   return type.definition.starts_with(iec::folded(type.name) + " : (");
@@ -170,6 +161,23 @@ Result<Compiler> find_compiler(const std::string& folder) {
       ErrorCode::not_found,
       "MATIEC was not found. Build it (github.com/beremiz/matiec), and name its folder by --matiec or "
       "PLCHOST_MATIEC");
+}
+
+std::vector<std::string> known_options(std::string_view help, std::string_view letters) {
+  std::vector<std::string> options;
+  for (const char letter : letters) {
+    if (help.contains(fmt::format("\n -{} : ", letter))) options.push_back(fmt::format("-{}", letter));
+  }
+  return options;
+}
+
+std::set<std::string> names_of_library(const std::string& library) {
+  std::set<std::string> names;
+  std::error_code none;  // without the folder iec2c says so
+  for (const fs::directory_entry& entry : fs::directory_iterator(library, none)) {
+    if (entry.path().extension() == ".txt") add_pous_in(entry.path(), names);
+  }
+  return names;
 }
 
 iec::SourceProblems taken_names(const iec::Project& project, const std::string& library) {

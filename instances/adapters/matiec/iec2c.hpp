@@ -1,8 +1,10 @@
 #pragma once
 
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/source_place.hpp"
@@ -22,12 +24,18 @@ struct Compiler {
 /// in PATH. The error says how to get one.
 [[nodiscard]] Result<Compiler> find_compiler(const std::string& folder);
 
+/// The options that `help`, the output of "iec2c -h", tells, of these letters.
+[[nodiscard]] std::vector<std::string> known_options(std::string_view help, std::string_view letters);
+
 /// The name of the joined file, in the folder in which iec2c runs.
 inline constexpr std::string_view kJoinedFile = "joined.st";
 
 /// POUs that are called as one of the compiler's library (texts in the folder `library`). iec2c ends at them
 /// without a place.
 [[nodiscard]] iec::SourceProblems taken_names(const iec::Project& project, const std::string& library);
+
+/// The names of the POUs in that library, folded.
+[[nodiscard]] std::set<std::string> names_of_library(const std::string& library);
 
 /// Variables and values of enumerations that are called as a POU of that library. iec2c refuses them in other
 /// words.

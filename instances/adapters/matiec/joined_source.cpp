@@ -160,6 +160,25 @@ class BodyFinder {
   std::vector<std::size_t> begins_;
 };
 
+// Of the actions of charts: iec2c counts the lines twice that are empty before a body. A comment keeps it
+// from that.
+class ActionFinder {
+ public:
+  /// Each token, in the order of the source: whether it is the colon before a body.
+  [[nodiscard]] bool ends_head(const Token& token) {
+    const bool result = behind_ == 2 && token.is(":");
+    if (token.is("ACTION")) {
+      behind_ = 1;
+    } else {
+      behind_ = behind_ == 1 && token.kind == Token::Kind::name ? 2 : 0;
+    }
+    return result;
+  }
+
+ private:
+  int behind_ = 0;  // 1: ACTION, 2: ACTION NAME
+};
+
 struct TextForIec2c {
   std::string text;
   std::vector<iec::Stretch> inserted;
@@ -204,6 +223,7 @@ TextForIec2c for_iec2c(const iec::Source& source) {
   IntervalFinder intervals;
   SectionSplitter sections;
   BodyFinder bodies;
+  ActionFinder actions;
   TemporarySections temporaries;
   SectionSplitter::Insertions insertions;
   for (const Token& token : tokens.all) {
@@ -214,6 +234,7 @@ TextForIec2c for_iec2c(const iec::Source& source) {
     const bool is_interval = intervals.is_interval(token);
     sections.look(token);
     bodies.look(token);
+    if (actions.ends_head(token)) insertions.emplace_back(token.offset + token.text.size(), " (**)");
     if (temporaries.begins_one(token))
       blank(text, token.offset + kVar.size(), token.text.size() - kVar.size());
     if (token.kind == Token::Kind::text) {

@@ -13,7 +13,7 @@ namespace plchost::matiec {
 /// All sources one behind the other, as iec2c takes one file, and where each began. Some things are replaced,
 /// and no other word moves: comments of the third edition, pragmas of other tools, the mark of UTF-8,
 /// VAR_TEMP. So are locations in lower case, and intervals in units that iec2c does not know: it needs only
-/// that there is one. In texts, "(*" and $L are written by codes.
+/// that there is one. Actions of charts get a comment. In texts, "(*" and $L are written by codes.
 class JoinedSource {
  public:
   explicit JoinedSource(std::span<const iec::Source> sources);

@@ -49,4 +49,7 @@ static void plchost_rtc_body__(RTC* data__) {
 }
 #define RTC_body__ plchost_rtc_body__
 
+/* reference^ := value */
+#define PLCHOST_SET_REFERENCE(reference, ...) (*(reference) = (__VA_ARGS__))
+
 #endif

@@ -36,8 +36,9 @@ std::string_view name_before_parenthesis(std::string_view line) {
 
 class Instrumenter {
  public:
-  Instrumenter(std::string_view code, const JoinedSource& source, const iec::Project& project)
-      : code_(code), source_(source), project_(project) {}
+  Instrumenter(std::string_view code, const JoinedSource& source, const iec::Project& project,
+               const iec::FindLine& find_line)
+      : code_(code), source_(source), project_(project), find_line_(find_line) {}
 
   DebugCode run() {
     made_.text = fmt::format("#include \"{}\"\n", iec::kDebugFile);
@@ -85,8 +86,9 @@ class Instrumenter {
       made_.pous.push_back({.name = name_, .file = place.file, .lines = {}});
       enter(made_.pous.back());
     }
-    made_.pous[*number_].lines.push_back(place.line);
-    made_.text += fmt::format("{}{} */\n{}", kComment, joined, iec::debug_statement(place.line));
+    const unsigned line = find_line_(place.file, place.line);
+    made_.pous[*number_].lines.push_back(line);
+    made_.text += fmt::format("{}{} */\n{}", kComment, joined, iec::debug_statement(line));
   }
 
   // The local variables of a function are those of C, which stand before. Those of others are members.
@@ -101,6 +103,7 @@ class Instrumenter {
   std::string_view code_;
   const JoinedSource& source_;
   const iec::Project& project_;
+  const iec::FindLine& find_line_;
   DebugCode made_;
   bool function_follows_ = false;
   std::string name_;  // of the POU that the text is in; empty: none yet
@@ -139,8 +142,9 @@ unsigned joined_line_of(std::string_view code, unsigned line) {
   return joined;
 }
 
-DebugCode with_statements(std::string_view code, const JoinedSource& source, const iec::Project& project) {
-  return Instrumenter(code, source, project).run();
+DebugCode with_statements(std::string_view code, const JoinedSource& source, const iec::Project& project,
+                          const iec::FindLine& find_line) {
+  return Instrumenter(code, source, project, find_line).run();
 }
 
 }  // namespace plchost::matiec

@@ -6,6 +6,7 @@
 
 #include "instances/adapters/iec/debug_pous.hpp"
 #include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/source_place.hpp"
 #include "instances/adapters/matiec/joined_source.hpp"
 
 namespace plchost::matiec {
@@ -17,9 +18,9 @@ struct DebugCode {
 };
 
 /// `code`: POUS.c as "iec2c -O l" writes it, of this source: "#line N" is before each statement. POUs that
-/// `project` does not have are without local variables.
+/// `project` does not have are without local variables. The statements have the lines of the user's files.
 [[nodiscard]] DebugCode with_statements(std::string_view code, const JoinedSource& source,
-                                        const iec::Project& project);
+                                        const iec::Project& project, const iec::FindLine& find_line);
 
 /// The same code for a compiler: each directive becomes a comment, so that the code has lines of its own.
 [[nodiscard]] std::string without_directives(std::string_view code);

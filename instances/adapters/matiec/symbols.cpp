@@ -135,10 +135,12 @@ class ValueCollector {
   // Of a value that stands in C as `symbol.value`.
   void add_type(const iec::Variable& variable, Symbol symbol, const std::string& type, std::size_t depth) {
     if (depth > kMostNested) return;
-    Words words(type);
+    Words words(type.starts_with(iec::kReference) ? type.substr(iec::kReference.size()) : type);
     const std::string written = words.take();
     const std::string first = folded(written);
-    if (const auto known = elementary(first)) {
+    if (first == "REF_TO") {
+      leave_out(variable, symbol, "it is a reference");
+    } else if (const auto known = elementary(first)) {
       symbol.type = *known;
       found_.all.push_back(std::move(symbol));
     } else if (first == "ARRAY") {

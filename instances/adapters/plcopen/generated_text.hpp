@@ -36,6 +36,11 @@ class GeneratedText {
   [[nodiscard]] const std::vector<TaskEvent>& events() const noexcept { return events_; }
   /// A problem of this text becomes one of the XML.
   void restore(iec::SourceProblem& problem) const;
+  /// The line of the XML on which a line of this text stands, from 1. Of an empty text: the same.
+  [[nodiscard]] unsigned line_in_xml(unsigned line) const noexcept;
+  /// The first line of a body on that line of the XML, else the first line of this text there. None: the
+  /// same.
+  [[nodiscard]] unsigned line_of_xml(unsigned xml_line) const noexcept;
 
  private:
   struct Origin {
@@ -43,6 +48,8 @@ class GeneratedText {
     unsigned body_line = 0;  // from 1; 0: it is in no body
     std::size_t pou = 0;     // of pous_
   };
+
+  [[nodiscard]] const Origin& origin_of(unsigned line) const noexcept;
 
   std::string text_;
   std::vector<Origin> origins_;  // of each line

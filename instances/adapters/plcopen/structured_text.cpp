@@ -139,11 +139,25 @@ void ProjectSources::add_events(iec::Configuration& configuration) const {
 void ProjectSources::restore(iec::SourceProblems& problems, iec::SourceProblems& remarks) const {
   for (auto* const told : {&problems, &remarks}) {
     for (iec::SourceProblem& problem : *told) {
-      const auto text = std::ranges::find(texts_, problem.place.file, &decltype(texts_)::value_type::first);
-      if (text != texts_.end()) text->second.restore(problem);
+      if (const GeneratedText* const text = text_of(problem.place.file)) text->restore(problem);
     }
   }
   std::ranges::copy(remarks_, std::back_inserter(remarks));
+}
+
+const GeneratedText* ProjectSources::text_of(std::string_view file) const noexcept {
+  const auto text = std::ranges::find(texts_, file, &decltype(texts_)::value_type::first);
+  return text == texts_.end() ? nullptr : &text->second;
+}
+
+unsigned ProjectSources::line_in_file(std::string_view file, unsigned line) const noexcept {
+  const GeneratedText* const text = text_of(file);
+  return text == nullptr ? line : text->line_in_xml(line);
+}
+
+unsigned ProjectSources::line_in_source(std::string_view file, unsigned line) const noexcept {
+  const GeneratedText* const text = text_of(file);
+  return text == nullptr ? line : text->line_of_xml(line);
 }
 
 }  // namespace plchost::plcopen

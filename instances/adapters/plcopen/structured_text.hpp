@@ -41,8 +41,14 @@ class ProjectSources {
   void add_events(iec::Configuration& configuration) const;
   /// Problems and remarks of the ST get their places in the XML. The remarks of all XML come to the others.
   void restore(iec::SourceProblems& problems, iec::SourceProblems& remarks) const;
+  /// The line of the file on which a line of its source stands. Of ST it is the same.
+  [[nodiscard]] unsigned line_in_file(std::string_view file, unsigned line) const noexcept;
+  /// A line of the source that stands on that line of the file: the first one in a body, if there is one.
+  [[nodiscard]] unsigned line_in_source(std::string_view file, unsigned line) const noexcept;
 
  private:
+  [[nodiscard]] const GeneratedText* text_of(std::string_view file) const noexcept;
+
   std::vector<std::pair<std::string, GeneratedText>> texts_;  // by the name of the file
   iec::SourceProblems remarks_;
 };

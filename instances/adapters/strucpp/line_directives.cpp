@@ -1,6 +1,7 @@
 #include "instances/adapters/strucpp/line_directives.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <vector>
 
@@ -35,9 +36,24 @@ std::string_view pou_that_begins(std::string_view line) {
   return name;
 }
 
+// #line N "FILE", with that file, else its own.
+std::string renewed(std::string_view directive, const std::optional<std::string>& file,
+                    const iec::FindLine& find_line) {
+  unsigned line = 0;
+  const char* const end = directive.data() + directive.size();
+  const bool has_line =
+      std::from_chars(directive.data() + kDirective.size(), end, line).ec == std::errc() && line != 0;
+  const std::size_t begin = directive.find('"');
+  if (!has_line || (!file && begin == std::string_view::npos)) return fmt::format("{}\n", directive);
+  const std::string_view own = begin == std::string_view::npos ? "" : directive.substr(begin + 1);
+  const std::string name = file ? *file : std::string(own.substr(0, own.find('"')));
+  return fmt::format("{}{} \"{}\"\n", kDirective, find_line(name, line), name);
+}
+
 }  // namespace
 
-std::string with_files_of_pous(std::string_view code, const FindFile& find_file) {
+std::string with_files_of_pous(std::string_view code, const FindFile& find_file,
+                               const iec::FindLine& find_line) {
   std::string made;
   std::optional<std::string> file;
   std::vector<std::string_view> directives;  // the head of a POU comes behind its own
@@ -53,10 +69,7 @@ std::string with_files_of_pous(std::string_view code, const FindFile& find_file)
     if (const std::string_view pou = pou_that_begins(line); !pou.empty()) {
       if (auto found = find_file(pou)) file = *std::move(found);
     }
-    for (const std::string_view directive : directives) {
-      const std::string_view number = first_word(directive.substr(kDirective.size()));
-      made += file ? fmt::format("{}{} \"{}\"\n", kDirective, number, *file) : fmt::format("{}\n", directive);
-    }
+    for (const std::string_view directive : directives) made += renewed(directive, file, find_line);
     directives.clear();
     made += line;
     if (has_end) made += '\n';

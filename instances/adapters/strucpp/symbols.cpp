@@ -154,7 +154,7 @@ class Resolver {
     place_ = variable.place;
     symbol.area = variable.location;
     symbol.read_only = symbol.read_only || variable.constant;
-    if (!variable.type.starts_with("REFERENCE ")) return true;
+    if (!variable.type.starts_with(iec::kReference)) return true;
     leave_out(symbol.name, "it has references");
     return false;
   }

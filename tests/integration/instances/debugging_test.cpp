@@ -341,19 +341,27 @@ TEST_F(DebuggingByHand, StopsAndStartsAHaltedTask) {
   EXPECT_EQ(process_->end(SIGTERM), 0);
 }
 
-TEST_F(DebuggingByHand, IgnoresTasksOfExternalEventsUnderOtherSchedulers) {
+/// Under the scheduler of that name.
+class DebuggingUnder : public DebuggingByHand, public ::testing::WithParamInterface<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Each, DebuggingUnder, ::testing::Values("CmpScheduleTimer", "CmpScheduleOneShot"),
+                         [](const auto& scheduler) { return scheduler.param; });
+
+TEST_P(DebuggingUnder, IgnoresTasksOfExternalEvents) {
   attach();
   EXPECT_EQ(command("break Edge").value("remark", "x"), "");
   PoolEvent edge = process_->event("edge");
   edge.post();
   ASSERT_TRUE(halts("Edge"));
-  const ControlReply switched = process_->ask(ControlVerb::set_scheduler, "CmpScheduleTimer");
+  const ControlReply switched = process_->ask(ControlVerb::set_scheduler, GetParam());
+  EXPECT_EQ(process_->runtime().scheduler.view(), GetParam());
   EXPECT_THAT(switched.text, HasSubstr("1 halted task was let go first"));
   EXPECT_EQ(task("Edge").value("state", ""), "ignored");
   EXPECT_THAT(command("break Edge:42").value("remark", ""), HasSubstr("Edge"));
   ASSERT_TRUE(eventually([&] { return cycles("Edge") == 1; })) << "the one that was let go";
   edge.post();
   EXPECT_TRUE(eventually([&] { return cycles("Edge") == 2; }));
+  command("break Main:24");
+  EXPECT_TRUE(halts("Main")) << "those of cyclic tasks are not ignored";
 }
 
 TEST_F(DebuggingByHand, TakesAnotherVersionWhileATaskHalts) {

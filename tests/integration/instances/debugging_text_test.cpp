@@ -1,57 +1,16 @@
 // A debug build of Structured Text, by way of each compiler that is there.
-#include <cstdlib>
+#include <algorithm>
 #include <string>
-#include <vector>
+#include <string_view>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/adapters/run_program.hpp"
-#include "shm/variables/variable_symbol.hpp"
-#include "tests/integration/instances/debugged_process.hpp"
+#include "tests/integration/instances/debugged_text.hpp"
 
 namespace plchost::testing {
 namespace {
-
-/// By the compiler of that name.
-class DebuggedText : public Debugging, public ::testing::WithParamInterface<std::string> {
- protected:
-  void SetUp() override {
-    const char* const variable = GetParam() == "matiec" ? "PLCHOST_MATIEC" : "PLCHOST_STRUCPP";
-    const char* const folder = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe)
-    if (folder == nullptr || *folder == '\0') GTEST_SKIP() << "needs " << variable;
-  }
-  void build_and_attach(const std::string& text) {
-    const std::string program = sandbox_.folder() + "/press.so";
-    const ProgramEnd built = run_program({PLCCTL, "build", "application", sandbox_.write("press.st", text),
-                                          "-o", program, "--compiler", GetParam(), "--debug"},
-                                         sandbox_.folder())
-                                 .value();
-    ASSERT_EQ(built.exit_code, 0) << built.output;
-    start(program);
-    attach();
-  }
-  void write(const std::string& text) {
-    const ControlReply reply = process_->ask(ControlVerb::write_variable, text);
-    EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
-  }
-  bool comes_to(const std::string& place) {
-    return eventually([&] { return stack("Main") == place; });
-  }
-  /// The value of a local variable of a call; "none": it has none of this name.
-  std::string local(std::size_t frame, const std::string& name) {
-    const json found = task("Main")["stack"][frame];
-    for (const json& one : found.value("locals", json::array())) {
-      if (!same_variable_name(one.value("name", ""), name)) continue;
-      if (!one.contains("elements")) return one.value("value", "");
-      return fmt::format("[{}]", fmt::join(one["elements"].get<std::vector<std::string>>(), ", "));
-    }
-    return "none";
-  }
-  std::string innermost() { return task("Main")["stack"][0].value("instance", ""); }
-};
 
 INSTANTIATE_TEST_SUITE_P(By, DebuggedText, ::testing::Values("matiec", "strucpp"),
                          [](const auto& compiler) { return compiler.param; });
@@ -359,6 +318,65 @@ TEST_P(DebuggedText, HasArraysThatItsBlocksAreGiven) {
   }
   EXPECT_EQ(stack_after("out"), "Press:41");
   EXPECT_EQ(values_->read("press1.line[2]"), "50");
+}
+
+// Its statements stand on other lines in the text that the build makes of it.
+constexpr const char* kPressInXml = R"(<?xml version='1.0' encoding='utf-8'?>
+<project xmlns='http://www.plcopen.org/xml/tc6_0201' xmlns:xhtml='http://www.w3.org/1999/xhtml'>
+<fileHeader companyName='a'/><contentHeader name='b'/>
+<types><dataTypes/><pous>
+<pou name='Counter' pouType='functionBlock'>
+<interface>
+<inputVars><variable name='up'><type><BOOL/></type></variable></inputVars>
+<outputVars><variable name='n'><type><INT/></type></variable></outputVars>
+</interface>
+<body><ST><xhtml:p><![CDATA[
+IF up THEN
+  n := n + 1;
+END_IF;
+]]></xhtml:p></ST></body>
+</pou>
+<pou name='Press' pouType='program'>
+<interface><localVars>
+<variable name='one'><type><derived name='Counter'/></type></variable>
+<variable name='cells'><type><array><dimension lower='1' upper='3'/><baseType><INT/></baseType></array></type></variable>
+<variable name='place'><type><INT/></type><initialValue><simpleValue value='1'/></initialValue></variable>
+</localVars></interface>
+<body>
+<ST><xhtml:p>one(up := place &lt; 9);
+
+cells[place] := one.n;
+place := place + 0;</xhtml:p></ST>
+</body>
+</pou>
+</pous></types>
+<instances><configurations><configuration name='cell'><resource name='line'>
+<task name='Main' interval='T#10ms' priority='1'><pouInstance name='press1' typeName='Press'/></task>
+</resource></configuration></configurations></instances></project>
+)";
+
+unsigned line_of(std::string_view words) {
+  const std::string_view text = kPressInXml;
+  return static_cast<unsigned>(1 + std::ranges::count(text.substr(0, text.find(words)), '\n'));
+}
+
+TEST_P(DebuggedText, OfAProjectOfPlcopenHaltsByTheLinesOfItsFile) {
+  ASSERT_NO_FATAL_FAILURE(build_and_attach(kPressInXml, "project.xml"));
+  const unsigned counts = line_of("n := n + 1");
+  const unsigned calls = line_of("one(up");
+  const unsigned fills = line_of("cells[place]");
+  const auto made = command(fmt::format("break project.xml:{}", counts));
+  EXPECT_EQ(made.value("pou", ""), "Counter");
+  EXPECT_EQ(made.value("line", 0U), counts);
+  ASSERT_TRUE(comes_to(fmt::format("Counter:{} Press:{}", counts, calls))) << state().dump(2);
+  EXPECT_THAT(task("Main")["stack"][0].value("file", ""), ::testing::EndsWith("project.xml"));
+  EXPECT_EQ(stack_after("out"), fmt::format("Press:{}", fills));
+  EXPECT_EQ(stack_after("next"), fmt::format("Press:{}", line_of("place := place")));
+  command("delete *");
+  EXPECT_EQ(command(fmt::format("break project.xml:{}", calls + 1)).value("line", 0U), fills)
+      << "the next statement from an empty line on";
+  EXPECT_THAT(refused(fmt::format("break project.xml:{}", line_of("<instances>"))),
+              ::testing::HasSubstr("has no statement from line"));
 }
 
 constexpr const char* kLine = R"(FUNCTION_BLOCK Pump

@@ -37,24 +37,27 @@ struct Interrupted {
 /// Builds programs in Structured Text, and runs them.
 class StructuredText : public ::testing::Test {
  protected:
-  ~StructuredText() override {
-    plc_image_close(&inputs_);
-    plc_image_close(&outputs_);
-    sut.reset();
+  ~StructuredText() override { clear(); }
+
+  /// Ends the instance, and forgets its areas.
+  void clear() {
+    end();
     remove_pool_memories(sandbox.pool());
   }
-
-  void start(const std::string& application, const std::string& kind = "first") {
-    plc_image_close(&inputs_);
-    plc_image_close(&outputs_);
-    sut.reset();
+  /// `scheduler`: empty: that of the application, or the usual one.
+  void start(const std::string& application, const std::string& kind = "first",
+             const std::string& scheduler = "") {
+    end();
     const std::string settings =
         sandbox.write("line1.cfg",
                       "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=in\nLinux.Area.0.Size=64\n"
                       "Linux.Area.1.Flags=0x8\nLinux.Area.1.Object=out\nLinux.Area.1.Size=64\n");
-    sut.emplace(sandbox, std::vector<std::string>{"--settings", settings, "--application", application,
-                                                  "--state-directory", sandbox.folder() + "/state",
-                                                  "--start-kind", kind});
+    std::vector<std::string> arguments{"--settings",        settings,
+                                       "--application",     application,
+                                       "--state-directory", sandbox.folder() + "/state",
+                                       "--start-kind",      kind};
+    if (!scheduler.empty()) arguments.insert(arguments.end(), {"--scheduler", scheduler});
+    sut.emplace(sandbox, arguments);
     sut->wait_until_up();
     ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", 64, PLC_IMAGE_WRITE, &inputs_), 0);
     ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", 64, PLC_IMAGE_READ, &outputs_), 0);
@@ -109,6 +112,12 @@ class StructuredText : public ::testing::Test {
   std::optional<InstanceProcess> sut;
 
  private:
+  void end() {
+    plc_image_close(&inputs_);
+    plc_image_close(&outputs_);
+    sut.reset();
+  }
+
   plc_image inputs_{};
   plc_image outputs_{};
 };

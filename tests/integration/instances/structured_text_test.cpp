@@ -185,8 +185,13 @@ TEST_P(TranslatedText, RunsAsItIsWritten) {
   ASSERT_TRUE(built.success()) << built.output;
   EXPECT_THAT(built.output, HasSubstr("twice.so: built"));
   EXPECT_THAT(built.output, HasSubstr("PROGRAM rest has no TASK: it runs freewheeling"));
-  start(sandbox.folder() + "/twice.so");
-  expect_it_works();
+  for (const char* const scheduler : {"CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"}) {
+    SCOPED_TRACE(scheduler);
+    clear();
+    ASSERT_NO_FATAL_FAILURE(start(so("twice"), "first", scheduler));
+    EXPECT_EQ(sut->runtime().scheduler.view(), scheduler);
+    expect_it_works();
+  }
 }
 
 TEST_P(TranslatedText, LoopsAsOftenAsItsBoundsSay) {

@@ -134,6 +134,13 @@ TEST(TheJoinedSource, HasLocatedVariablesInSectionsOfTheirOwn) {
   }
 }
 
+TEST(TheJoinedSource, LetsIec2cCountEachLineBeforeTheBodyOfAnActionOnce) {
+  const JoinedSource joined(
+      std::vector<iec::Source>{{"a.st", "ACTION Count:\n\n n := 1; END_ACTION\nACTION x;"}});
+  EXPECT_EQ(joined.text(), "ACTION Count: (**)\n\n n := 1; END_ACTION\nACTION x;\n");
+  EXPECT_EQ(joined.place(3, 2), (iec::SourcePlace{"a.st", 3, 2}));
+}
+
 TEST(TheJoinedSource, HasNoCommentWithinATextAndNoLineFeed) {
   const JoinedSource joined(
       std::vector<iec::Source>{{"a.st", "t := 'ab(*no $L1$$L$'(*('; (* '(*' *) n := NOSUCH; u := '*)';"}});

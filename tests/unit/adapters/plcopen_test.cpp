@@ -282,6 +282,12 @@ TEST(PlcopenXml, HasItsProblemsByTheLinesOfTheXml) {
   EXPECT_EQ(told("five;"), "a.xml:10: Main, line 5 of its body, column 3: wrong");
   EXPECT_EQ(told("END_PROGRAM"), "a.xml:10: Main, line 5 of its body, column 3: wrong");
   EXPECT_EQ(told("TASK fast"), "a.xml:11: wrong");
+  EXPECT_EQ(sut.text.line_in_xml(line_of("two;")), 8U);
+  EXPECT_EQ(sut.text.line_in_xml(line_of("END_PROGRAM")), 10U);
+  EXPECT_EQ(sut.text.line_of_xml(8), line_of("two;"));
+  EXPECT_EQ(sut.text.line_of_xml(9), line_of("three;")) << "of several the first one";
+  EXPECT_EQ(sut.text.line_of_xml(5), line_of("a : INT"));
+  EXPECT_EQ(sut.text.line_of_xml(1), 1U) << "nothing of it stands there";
   iec::SourceProblem without_column{{"a.xml", line_of("two;"), 0}, "wrong"};
   sut.text.restore(without_column);
   EXPECT_EQ(iec::describe(without_column), "a.xml:8: Main, line 2 of its body: wrong");

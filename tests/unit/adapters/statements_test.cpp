@@ -14,6 +14,10 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
+unsigned same_line(std::string_view /*file*/, unsigned line) {
+  return line;
+}
+
 // In the shape of what iec2c writes. The second source begins at line 4 of the joined one.
 constexpr const char* kCode = R"(// FUNCTION
 INT TWICE(
@@ -55,7 +59,7 @@ void EMPTY_body__(EMPTY *data__) {
 TEST(MatiecStatements, GetTheirMacros) {
   const std::vector<iec::Source> sources{{"a.st", "FUNCTION Twice\nTwice := x * 2;\nEND_FUNCTION\n"},
                                          {"b \"1\".st", "PROGRAM Main\nx\ny\nEND_PROGRAM\n"}};
-  const DebugCode made = with_statements(kCode, JoinedSource(sources), {});
+  const DebugCode made = with_statements(kCode, JoinedSource(sources), {}, same_line);
   ASSERT_EQ(made.pous.size(), 2U);
   EXPECT_EQ(made.pous[0].name, "TWICE");
   EXPECT_EQ(made.pous[0].file, "a.st");
@@ -142,7 +146,7 @@ TEST(MatiecLocals, AreThoseOfTheCThatAreNoSymbols) {
   const std::vector<iec::Source> sources{{"a.st", kLocalsText}};
   const iec::ReadProject read = iec::read_project(sources);
   ASSERT_TRUE(read.problems.empty());
-  const DebugCode made = with_statements(kLocals, JoinedSource(sources), read.project);
+  const DebugCode made = with_statements(kLocals, JoinedSource(sources), read.project, same_line);
   ASSERT_EQ(made.pous.size(), 2U);
   const auto shown = [](const iec::DebugPou& pou) {
     std::vector<std::string> all;

@@ -88,6 +88,10 @@ TEST(TemporariesOfStrucpp, OfDamagedCodeAreLeftToTheCompiler) {
     EXPECT_EQ(with_new_temporaries(code, project), code);
 }
 
+unsigned same_line(std::string_view /*file*/, unsigned line) {
+  return line;
+}
+
 TEST(LinesOfStrucpp, NameTheFileOfTheirPou) {
   const auto find = [](std::string_view pou) -> std::optional<std::string> {
     const std::map<std::string_view, std::string> files{
@@ -100,7 +104,7 @@ TEST(LinesOfStrucpp, NameTheFileOfTheirPou) {
                 "#line 6 \"a.st\"\n    A B;\n};\n#line 2 \"a.st\"\nvoid A::operator()() {\n"
                 "#line 3 \"a.st\"\n#line 4 \"a.st\"\n}\n#line 1 \"a.st\"\nIEC_INT TWICE(IEC_INT X) {\n}\n"
                 "#line 9 \"a.st\"\nvoid Configuration_C::run() {\n#line 8 \"a.st\"",
-                find),
+                find, same_line),
             "#line 1 \"a.st\"\nint x;\n#line 5 \"main.st\"\nclass Program_MAIN : public Base {\n"
             "#line 6 \"main.st\"\n    A B;\n};\n#line 2 \"a.st\"\nvoid A::operator()() {\n"
             "#line 3 \"a.st\"\n#line 4 \"a.st\"\n}\n#line 1 \"t.st\"\nIEC_INT TWICE(IEC_INT X) {\n}\n"
@@ -111,8 +115,20 @@ TEST(LinesOfStrucpp, NameTheFileOfADeclaredFunction) {
   const auto find = [](std::string_view pou) -> std::optional<std::string> {
     return pou == "TWICE" ? std::optional<std::string>("t.st") : std::nullopt;
   };
-  EXPECT_EQ(with_files_of_pous("#line 1 \"a.st\"\nIEC_INT TWICE(IEC_INT X);\n", find),
+  EXPECT_EQ(with_files_of_pous("#line 1 \"a.st\"\nIEC_INT TWICE(IEC_INT X);\n", find, same_line),
             "#line 1 \"t.st\"\nIEC_INT TWICE(IEC_INT X);\n");
+}
+
+TEST(LinesOfStrucpp, AreThoseOfTheUsersFile) {
+  const auto find = [](std::string_view pou) -> std::optional<std::string> {
+    return pou == "TWICE" ? std::optional<std::string>("a.xml") : std::nullopt;
+  };
+  const auto in_xml = [](std::string_view file, unsigned line) { return file == "a.xml" ? line + 20 : line; };
+  EXPECT_EQ(with_files_of_pous("#line 1 \"a.xml\"\nstruct P;\n#line 2 \"b.st\"\nIEC_INT TWICE(IEC_INT X) {\n"
+                               "#line 3 \"b.st\"\n}\n#line x\n#line 4 \"b.st\"",
+                               find, in_xml),
+            "#line 21 \"a.xml\"\nstruct P;\n#line 22 \"a.xml\"\nIEC_INT TWICE(IEC_INT X) {\n"
+            "#line 23 \"a.xml\"\n}\n#line x\n#line 4 \"b.st\"");
 }
 
 }  // namespace
