@@ -117,6 +117,15 @@ def story(port):
     made = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Twice"}, {"name": "Thrice"}])["breakpoints"]
     assert made[0]["verified"] and not made[1]["verified"], made
     client.event("stopped")
+    client.ask("setFunctionBreakpoints", breakpoints=[])
+    made = client.ask("setBreakpoints", source={"path": "/engineer/src/steps.st"}, breakpoints=[
+        {"line": 14, "logMessage": "n is {n}", "hitCondition": "%2"}, {"line": 26, "hitCondition": ">=3"}])["breakpoints"]
+    assert all(one["verified"] for one in made), made
+    cycles = int(client.ask("evaluate", expression="Main.cycles")["result"])
+    client.ask("continue", threadId=main)
+    assert client.event("output")["output"].startswith("n is "), client.events
+    assert client.event("stopped")["threadId"] == main and stack(client, main)[0]["line"] == 26
+    assert int(client.ask("evaluate", expression="Main.cycles")["result"]) >= cycles + 2, "it halts at the third hit"
     client.ask("disconnect")
 
 

@@ -249,6 +249,17 @@ TEST_F(DapSessionTest, SetsFunctionBreakpointsByTheirNames) {
   EXPECT_THAT(instance_.commands, ElementsAre("break Main if n > 5"));
 }
 
+TEST_F(DapSessionTest, SetsBreakpointsWithCountsConditionsAndTexts) {
+  const json one = {
+      {"line", 7}, {"hitCondition", "=3"}, {"condition", "n > 5"}, {"logMessage", "n is {n} if log"}};
+  const json wanted = {{"source", {{"path", "/src/a.st"}}},
+                       {"breakpoints", json::array({one, {{"line", 9}, {"hitCondition", "%2"}}})}};
+  const json made = ask("setBreakpoints", wanted)["breakpoints"];
+  EXPECT_TRUE(made[0]["verified"] && made[1]["verified"]) << made;
+  EXPECT_THAT(instance_.commands, ElementsAre("break /src/a.st:7 hits =3 if n > 5 log n is {n} if log",
+                                              "break /src/a.st:9 hits %2"));
+}
+
 TEST_F(DapSessionTest, LetsNoPlaceOfABreakpointHaveFurtherPartsOfTheCommand) {
   for (const char* const name :
        {"Main log x", "Main if n > 5", "Main hits =1", "Main\nlog", "", "two words"}) {
