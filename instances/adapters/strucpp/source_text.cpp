@@ -95,7 +95,7 @@ class Rewriter {
     for (; !at_end() && !token().is("END_VAR"); ++next_) {
       if (token().kind == Token::Kind::literal) name_by_dot(token());
       if (token().is(";")) first = &token(1);
-      if (token().is("AT") && token(1).kind == Token::Kind::place && iec::place_of(token(1).text))
+      if (token().is("AT") && token(1).kind == Token::Kind::place && iec::location_of(token(1).text))
         places_.push_back({first, &token(), &token(1)});
     }
   }
