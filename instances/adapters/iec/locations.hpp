@@ -29,7 +29,7 @@ class Locations {
   /// "%QW0".
   [[nodiscard]] std::vector<std::pair<std::string, Place>> not_by_numbers() const;
 
-  /// What the author may not expect: places that were chosen, places with locations apart, shared bits.
+  /// Told to the author: places that were chosen, places with locations apart, shared bits.
   [[nodiscard]] SourceProblems remarks() const;
 
  private:

@@ -169,8 +169,8 @@ END_RESOURCE END_CONFIGURATION
   const ProgramEnd shared = build(kText, "open");
   ASSERT_TRUE(shared.success()) << shared.output;
   EXPECT_THAT(shared.output,
-              HasSubstr("open.st:3:33: note: %IW0 shares its bits with %IX0.0: a value at one "));
-  EXPECT_THAT(shared.output, HasSubstr("open.st:4:57: note: %QW0 shares its bits with %QX0.0, %QX0.1: "));
+              HasSubstr("open.st:3:32: note: %IW0 shares its bits with %IX0.0: a value at one "));
+  EXPECT_THAT(shared.output, HasSubstr("open.st:4:53: note: %QW0 shares its bits with %QX0.0, %QX0.1: "));
   (void)sandbox.write("open.toml", "locations = 'separate'\n");
   const ProgramEnd built = build(kText, "open");
   ASSERT_TRUE(built.success()) << built.output;
@@ -251,7 +251,7 @@ END_RESOURCE END_CONFIGURATION
   ASSERT_TRUE(build(text, "other").success());
   const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
   EXPECT_EQ(refused.code, ErrorCode::refused);
-  EXPECT_THAT(refused.text, HasSubstr("'location-QW0.2': its qwLayout is 1, of the one that runs it is 17"));
+  EXPECT_THAT(refused.text, HasSubstr("'location-QW0.2': qwLayout is 1, of the one that runs it is 17"));
   (void)sandbox.write("other.toml", "[location]\n'%QW0.2' = '%QW1'\n'%QW0.3' = '%QW0'\n");
   ASSERT_TRUE(build(text, "other").success());
   const ControlReply kept = sut->ask(ControlVerb::change_application, so("other"));
