@@ -314,6 +314,10 @@ int plchost_declare_places(void) {
     /* An output is what the program has; an edge is one of a value of before. */
     if (plc_keep_variables(place->name, place->value, place->bytes, 0) != ERR_OK) return 0;
   }
+  for (i = 0; i < plchost_location_count; ++i) {
+    struct plchost_location* const location = &plchost_locations[i];
+    if (plc_keep_variables(location->name, &location->kept, 1, location->layout) != ERR_OK) return 0;
+  }
   if (!allocate_areas()) return 0;
   for (i = 0; i < AREAS; ++i) {
     if (!declare(&areas[i])) return 0;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "instances/adapters/iec/locations.hpp"
 #include "instances/adapters/iec/tokens.hpp"
 #include "shm/variables/variable_symbol.hpp"
 
@@ -16,13 +17,6 @@ namespace {
 
 std::string list_of(const std::vector<std::size_t>& numbers) {
   return fmt::format("{}{}0", fmt::join(numbers, ", "), numbers.empty() ? "" : ", ");
-}
-
-unsigned first_bit(const Place& place) {
-  return place.offset * 8 + static_cast<unsigned>(std::max(place.bit, 0));
-}
-unsigned end_bit(const Place& place) {
-  return place.bit < 0 ? (place.offset + place.bytes) * 8 : first_bit(place) + 1;
 }
 
 }  // namespace
@@ -49,6 +43,7 @@ Glue GlueWriter::write() {
   write_storage();
   write_copies();
   write_places();
+  write_locations();
   refuse_shared_bits();
   for (std::size_t i = 0; i < plan_.tasks.size(); ++i) write_task(plan_.tasks[i], i);
   write_tasks();
@@ -106,8 +101,8 @@ void GlueWriter::write_symbols() {
   print("void plchost_each_symbol(void (*use)(const struct plchost_symbol*)) {{ (void)use; }}\n");
 }
 
-Place GlueWriter::place_or_none(const Variable& variable) {
-  return place_of(variable.location).value_or(Place{.area = ' '});
+Place GlueWriter::place_or_none(const Variable& variable) const {
+  return plan_.locations.place(variable.location).value_or(Place{.area = ' '});
 }
 
 void GlueWriter::write_places() {
@@ -121,6 +116,18 @@ void GlueWriter::write_places() {
       "const unsigned int plchost_place_count = {};\nconst struct plchost_place plchost_places[] = {{\n{}  "
       "{{0}}}};\nunsigned long long plchost_exchanged[{}];\n",
       places_.size(), table, places_.size() + 1);
+}
+
+void GlueWriter::write_locations() {
+  std::string table;
+  const auto moved = plan_.locations.not_by_numbers();
+  for (const auto& [location, place] : moved)
+    table += fmt::format("  {{\"location-{}\", {}u, 0}},\n", location.substr(1), first_bit(place) + 1);
+  print(
+      "const unsigned int plchost_location_count = {};\nstruct plchost_location plchost_locations[] = {{\n{} "
+      " "
+      "{{0}}}};\n",
+      moved.size(), table);
 }
 
 // In the order of their begins. One that begins before the others have ended shares bits.

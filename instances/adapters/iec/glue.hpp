@@ -95,13 +95,14 @@ class GlueWriter {
   [[nodiscard]] const TaskPlan& plan() const noexcept { return plan_; }
   [[nodiscard]] std::vector<Known>& places() noexcept { return places_; }
   /// Of a global that is located; else one of no area.
-  [[nodiscard]] static Place place_or_none(const Variable& variable);
+  [[nodiscard]] Place place_or_none(const Variable& variable) const;
 
  private:
   void find_copies();
   void write_copies();
   void write_call(const Program& program);
   void write_places();
+  void write_locations();
   void find_aliases();
   void refuse_shared_bits();
   [[nodiscard]] bool shares_bits(std::size_t task) const;

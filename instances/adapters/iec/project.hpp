@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "instances/adapters/iec/location_options.hpp"
 #include "instances/adapters/iec/source_place.hpp"
 #include "instances/adapters/iec/task_extension.hpp"
 
@@ -94,6 +95,7 @@ struct Configuration {
   std::vector<Variable> globals;
   std::vector<Resource> resources;  ///< one without a name, if tasks stand in the configuration itself
   SourcePlace place;
+  LocationOptions locations = {};
 };
 
 class Project {

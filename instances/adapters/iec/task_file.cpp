@@ -33,8 +33,10 @@ using namespace std::string_view_literals;
 constexpr std::array kLatePolicies = {"next"sv, "asap"sv};
 constexpr std::array kWatchdogPolicies = {"application"sv, "task"sv};
 constexpr std::array kGlobals = {"shared"sv, "copy"sv};
+constexpr std::array kWidths = {"shared"sv, "separate"sv};
 static_assert(std::to_underlying(LatePolicy::asap) == 1);
 static_assert(std::to_underlying(WatchdogPolicy::task) == 1);
+static_assert(std::to_underlying(Widths::separate) == 1);
 
 constexpr std::string_view kSchedulerIsElsewhere =
     "one scheduler runs all tasks of an instance; write it before the first table, or in [resource.NAME]";
@@ -57,7 +59,8 @@ struct KnownProgram {
 
 class TaskFileReader {
  public:
-  TaskFileReader(const Source& file, Configuration& configuration) : file_(file) {
+  TaskFileReader(const Source& file, Configuration& configuration)
+      : file_(file), locations_(configuration.locations) {
     for (Resource& resource : configuration.resources) {
       resources_.push_back(&resource);
       for (Task& task : resource.tasks) {
@@ -103,9 +106,13 @@ class TaskFileReader {
         read_resources(value);
       } else if (key == "scheduler") {
         for (Resource* const resource : resources_) read_scheduler(value, *resource);
+      } else if (key == "locations") {
+        read_widths(value);
+      } else if (key == "location") {
+        read_locations(value);
       } else if (!read_part(key, value, nullptr)) {
         refuse(key, value,
-               "scheduler, [task.NAME], [program.NAME], [resource.NAME.task.NAME] and "
+               "scheduler, locations, [location], [task.NAME], [program.NAME], [resource.NAME.task.NAME] and "
                "[resource.NAME.program.NAME]");
       }
     }
@@ -126,6 +133,52 @@ class TaskFileReader {
                                         join_names(kSchedulerNames)));
     }
     if (resource.scheduler.empty()) resource.scheduler = *name;
+  }
+
+  void read_widths(const TomlValue& value) {
+    const auto* const word = std::get_if<std::string>(&value.value);
+    const auto* const known = word == nullptr ? kWidths.end() : std::ranges::find(kWidths, *word);
+    if (known == kWidths.end()) {
+      return problem(value, fmt::format("locations: {} is not known; allowed are {}", value.shown(),
+                                        join_names(kWidths)));
+    }
+    locations_.widths = static_cast<Widths>(known - kWidths.begin());
+  }
+  void read_locations(const TomlValue& value) {
+    const TomlTable* const lines = table(value, "location");
+    if (lines == nullptr) return;
+    for (const auto& [key, one] : *lines) {
+      if (problems_.size() >= kMostProblems) return;
+      read_location(key, one);
+    }
+  }
+  // "%IW0.0.0.2" = "%IW2"
+  void read_location(const std::string& key, const TomlValue& value) {
+    auto location = location_of(key);
+    if (!location) {
+      return problem(value, fmt::format("'{}' is no location; a line of [location] is like \"%IW0.0.0.2\" = "
+                                        "\"%IW2\"",
+                                        shown(key)));
+    }
+    const auto* const text = std::get_if<std::string>(&value.value);
+    auto given = location_of(text == nullptr ? "" : *text);
+    const auto alike = [](const Location& one) { return std::tuple(one.area, one.bytes, one.is_bit); };
+    if (!given || !given->is_direct() || alike(*given) != alike(*location)) {
+      const Location like{.area = location->area,
+                          .numbers = location->is_bit ? std::vector{2U, 0U} : std::vector{2U},
+                          .bytes = location->bytes,
+                          .is_bit = location->is_bit};
+      return problem(value, fmt::format("location {}: {} is not allowed; allowed is a place of its area and "
+                                        "width, like \"{}\"",
+                                        location->text(), value.shown(), like.text()));
+    }
+    const auto [known, is_new] = locations_.given.try_emplace(
+        *std::move(location),
+        LocationOptions::Given{*std::move(given), {file_.file, value.line, value.column}});
+    if (!is_new) {
+      problem(value, fmt::format("the location {} is given in line {}, too; remove one of both",
+                                 known->first.text(), known->second.place.line));
+    }
   }
 
   void read_resources(const TomlValue& value) {
@@ -301,6 +354,7 @@ class TaskFileReader {
   }
 
   const Source& file_;
+  LocationOptions& locations_;
   std::vector<Resource*> resources_;
   std::vector<KnownTask> tasks_;
   std::vector<KnownProgram> programs_;

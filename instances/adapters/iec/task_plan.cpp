@@ -46,6 +46,7 @@ class Planner {
       if (!program.task.empty()) programs_[folded(program.task)].push_back(&program);
     }
     is_first_ = &resource == configuration.resources.data();
+    plan_.locations = Locations(project, configuration);
   }
 
   TaskPlan plan() {
@@ -156,10 +157,11 @@ class Planner {
     for (const Resource& resource : configuration_.resources) {
       for (const Variable& variable : resource.globals) add_located(variable, nullptr);
     }
+    if (is_first_) plan_.remarks = plan_.locations.remarks();
   }
   void add_located(const Variable& variable, const Pou* pou) {
     if (variable.location.empty()) return;
-    const auto place = place_of(variable.location);
+    const auto place = plan_.locations.place(variable.location);
     if (place) plan_.located[*place].push_back(&variable);
     if (!is_first_) return;
     const auto wrong = [&](std::string text) { plan_.problems.push_back({variable.place, std::move(text)}); };
@@ -173,8 +175,8 @@ class Planner {
     if (bytes_of_type(type) != place->bytes || (place->bit >= 0) != (type == "BOOL"))
       return wrong(fmt::format("{} does not fit into {}", variable.type, variable.location));
     if (compiler_ != Compiler::matiec) return;
-    // iec2c gives them one name in C.
-    const auto [other, is_new] = types_.try_emplace(variable.location, type);
+    // They have one value in C.
+    const auto [other, is_new] = types_.try_emplace(*place, type);
     if (!is_new && other->second != type)
       wrong(fmt::format("{} is {} here and {} elsewhere: give the variables of one location one type",
                         variable.location, variable.type, other->second));
@@ -222,9 +224,9 @@ class Planner {
     uses.globals.insert(name);
     use_place(*global->second, uses);
   }
-  static void use_place(const Variable& variable, Uses& uses) {
+  void use_place(const Variable& variable, Uses& uses) const {
     if (variable.location.empty()) return;
-    if (const auto place = place_of(variable.location)) uses.places.insert(*place);
+    if (const auto place = plan_.locations.place(variable.location)) uses.places.insert(*place);
   }
 
   void check(const PlannedTask& task) {
@@ -322,7 +324,7 @@ class Planner {
       return;
     }
     const std::string& location = global->second->location;
-    const auto place = place_of(location);
+    const auto place = plan_.locations.place(location);
     // The memory area is read where it lies.
     if (!place || place->area == 'M') return;
     // With iec2c all variables of a place are one, but an input of a program has a value for each task.
@@ -456,7 +458,7 @@ class Planner {
   bool is_first_ = false;  // of the configuration: it says what is wrong outside of the resources
   std::map<std::string, std::vector<const Program*>> programs_;  // by the folded name of their task
   std::map<std::string, Uses> uses_;                             // by the folded name of a program's type
-  std::map<std::string, std::string> types_;                     // of each location
+  std::map<Place, std::string> types_;
   TaskPlan plan_;
 };
 

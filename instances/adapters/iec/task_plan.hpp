@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "instances/adapters/iec/compiler.hpp"
+#include "instances/adapters/iec/locations.hpp"
 #include "instances/adapters/iec/place.hpp"
 #include "instances/adapters/iec/project.hpp"
 #include "instances/adapters/iec/source_place.hpp"
@@ -30,6 +31,7 @@ struct TaskPlan {
   std::vector<PlannedTask> tasks;
   /// Those that all programs of the resource see, by their folded name; of one name that of the resource.
   std::map<std::string, const Variable*> globals;
+  Locations locations;
   /// All located variables of the project, in the order of the source.
   std::map<Place, std::vector<const Variable*>> located;
   SourceProblems problems;

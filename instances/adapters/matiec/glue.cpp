@@ -51,19 +51,23 @@ class Writer : public iec::GlueWriter {
   // Of the same name once: several programs may have it.
   void find_places() override {
     for (const Located& pointer : located_) {
-      const auto place = iec::place_of(pointer.location);
+      const auto place = plan().locations.place(pointer.location);
       if (!place || !plan().located.contains(*place)) {
         const auto written = project().locations.find(pointer.location);
         plan().problems.push_back(
             {written == project().locations.end() ? configuration().place : written->second,
              fmt::format("{}: the declaration around it is not understood", pointer.location)});
-      } else if (numbers_.try_emplace(*place, places().size()).second) {
+        continue;
+      }
+      const auto [number, is_new] = numbers_.try_emplace(*place, places().size());
+      if (is_new) {
         places().push_back({.name = pointer.name,
                             .value = fmt::format("plchost_value_{}", places().size()),
                             .location = pointer.location,
                             .place = *place});
-        pointers_.push_back(&pointer);
+        pointers_.emplace_back();
       }
+      pointers_[number->second].push_back(&pointer);
     }
     for (std::size_t i = 0; i < plan().tasks.size(); ++i) {
       for (const Place& place : plan().tasks[i].places) {
@@ -74,8 +78,10 @@ class Writer : public iec::GlueWriter {
   }
   void write_storage() override {
     for (std::size_t i = 0; i < pointers_.size(); ++i) {
-      const Located& pointer = *pointers_[i];
-      print("static {0} plchost_value_{2};\n{0} *{1} = &plchost_value_{2};\n", pointer.type, pointer.name, i);
+      const std::string& type = pointers_[i].front()->type;
+      print("static {} plchost_value_{};\n", type, i);
+      for (const Located* const pointer : pointers_[i])
+        print("{} *{} = &plchost_value_{};\n", type, pointer->name, i);
     }
   }
 
@@ -113,11 +119,11 @@ class Writer : public iec::GlueWriter {
         const auto known = numbers_.find(place);
         if (place.area != 'I' || known == numbers_.end() || places()[known->second].tasks.size() < 2)
           continue;
-        const Located& located = *pointers_[known->second];
         const std::string value = fmt::format("plchost_input_{}_{}", number, known->second);
-        pointers += fmt::format("  {} = &{};\n", located.name, value);
+        for (const Located* const pointer : pointers_[known->second])
+          pointers += fmt::format("  {} = &{};\n", pointer->name, value);
         if (!own.insert(place).second) continue;
-        print("static {} {};\n", located.type, value);
+        print("static {} {};\n", pointers_[known->second].front()->type, value);
         own_values_[{place, number}] = value;
         add(known->second, value);
       }
@@ -183,7 +189,7 @@ class Writer : public iec::GlueWriter {
 
   const std::vector<Located>& located_;
   std::span<const iec::DebugPou> pous_;
-  std::vector<const Located*> pointers_;                             // for each place
+  std::vector<std::vector<const Located*>> pointers_;                // for each place
   std::map<Place, std::size_t> numbers_;                             // of places
   std::map<std::pair<Place, std::size_t>, std::string> own_values_;  // of inputs, by the number of the task
   std::string bindings_;

@@ -366,7 +366,7 @@ class Collector : ValueCollector {
   }
 
   void add_located(const iec::Variable& variable, Symbol symbol) {
-    const auto place = iec::place_of(variable.location);
+    const auto place = plan_.locations.place(variable.location);
     symbol.value = place ? value_of_place_(*place, task_) : "";
     if (symbol.value.empty()) return;  // its declaration is refused elsewhere
     symbol.area = variable.location;

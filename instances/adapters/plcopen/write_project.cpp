@@ -119,7 +119,7 @@ class Declared {
     std::vector<std::string> words;
     if (std::string other = told_name(member.name, name); !other.empty()) words.push_back(std::move(other));
     if (const std::string address = member.variable == nullptr ? "" : member.variable->address;
-        owner.empty() && iec::place_of(folded(address))) {
+        owner.empty() && iec::location_of(folded(address))) {
       set(variable, "address", address);
     } else if (!address.empty()) {
       words.push_back("it lies at " + address);

@@ -61,7 +61,7 @@ class Writer : public iec::GlueWriter {
   void add(const std::string& name, const std::string& value, const iec::Variable& variable,
            std::set<std::size_t> tasks) {
     // Without one there is a problem already.
-    const auto place = iec::place_of(variable.location);
+    const auto place = plan().locations.place(variable.location);
     if (!place) return;
     places().push_back({.name = name,
                         .value = fmt::format("*{}.raw_ptr()", value),

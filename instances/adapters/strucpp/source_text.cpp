@@ -52,6 +52,7 @@ class Rewriter {
   }
 
   SourceText run() {
+    read_globals();
     for (next_ = 0; !at_end(); ++next_) {
       const Token& token = tokens_[next_];
       if (token.kind == Token::Kind::literal) name_by_dot(token);
@@ -95,8 +96,24 @@ class Rewriter {
     for (; !at_end() && !token().is("END_VAR"); ++next_) {
       if (token().kind == Token::Kind::literal) name_by_dot(token());
       if (token().is(";")) first = &token(1);
-      if (token().is("AT") && token(1).kind == Token::Kind::place && iec::place_of(token(1).text))
+      if (token().is("AT") && token(1).kind == Token::Kind::place && iec::location_of(token(1).text))
         places_.push_back({first, &token(), &token(1)});
+    }
+  }
+
+  // Those of several numbers: the compiler refuses them.
+  void read_globals() {
+    for (next_ = 0; !at_end(); ++next_) {
+      if (!token().is("VAR_GLOBAL")) continue;
+      ++next_;
+      while (token().is("RETAIN") || token().is("NON_RETAIN") || token().is("CONSTANT")) ++next_;
+      const Token* first = &token();  // of the declaration
+      for (; !at_end() && !token().is("END_VAR"); ++next_) {
+        if (token().is(";")) first = &token(1);
+        if (!token().is("AT") || token(1).kind != Token::Kind::place) continue;
+        const auto location = iec::location_of(token(1).text);
+        if (location && !location->is_direct()) places_.push_back({first, &token(), &token(1)});
+      }
     }
   }
 

@@ -14,7 +14,7 @@ namespace plchost::strucpp {
 /// A source as STruC++ gets it. All lines stay as they are.
 struct SourceText {
   /// A place that a variable of a program has. The compiler lets no two variables have one, so it does not
-  /// see it.
+  /// see it. Nor does it see one of several numbers that a global has.
   struct HiddenPlace {
     unsigned line;         ///< of the first name of the declaration
     std::string name;      ///< that name, folded

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -8,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -48,10 +48,11 @@ class StructuredText : public ::testing::Test {
   void start(const std::string& application, const std::string& kind = "first",
              const std::string& scheduler = "") {
     end();
-    const std::string settings =
-        sandbox.write("line1.cfg",
-                      "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=in\nLinux.Area.0.Size=64\n"
-                      "Linux.Area.1.Flags=0x8\nLinux.Area.1.Object=out\nLinux.Area.1.Size=64\n");
+    const std::string settings = sandbox.write(
+        "line1.cfg", fmt::format("[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=in\n"
+                                 "Linux.Area.0.Size={0}\nLinux.Area.1.Flags=0x8\nLinux.Area.1.Object=out\n"
+                                 "Linux.Area.1.Size={0}\n",
+                                 image_bytes));
     std::vector<std::string> arguments{"--settings",        settings,
                                        "--application",     application,
                                        "--state-directory", sandbox.folder() + "/state",
@@ -59,17 +60,18 @@ class StructuredText : public ::testing::Test {
     if (!scheduler.empty()) arguments.insert(arguments.end(), {"--scheduler", scheduler});
     sut.emplace(sandbox, arguments);
     sut->wait_until_up();
-    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", 64, PLC_IMAGE_WRITE, &inputs_), 0);
-    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", 64, PLC_IMAGE_READ, &outputs_), 0);
+    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", image_bytes, PLC_IMAGE_WRITE, &inputs_), 0);
+    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", image_bytes, PLC_IMAGE_READ, &outputs_), 0);
   }
-  void put(ImageIn inputs) {
-    std::array<char, 64> bytes{};
+  template <class Image = ImageIn>
+  void put(const Image& inputs) {
+    std::vector<char> bytes(image_bytes);
     std::memcpy(bytes.data(), &inputs, sizeof inputs);
     plc_image_write(&inputs_, bytes.data());
   }
   template <class Image = ImageOut>
   Image outputs() {
-    std::array<char, 64> bytes{};
+    std::vector<char> bytes(image_bytes);
     EXPECT_EQ(plc_image_read(&outputs_, bytes.data(), nullptr), PLC_IMAGE_OK);
     Image outputs;
     std::memcpy(&outputs, bytes.data(), sizeof outputs);
@@ -110,6 +112,7 @@ class StructuredText : public ::testing::Test {
 
   Sandbox sandbox;
   std::optional<InstanceProcess> sut;
+  unsigned image_bytes = 64;
 
  private:
   void end() {

@@ -1,5 +1,6 @@
 // Tasks and globals of a program in Structured Text that have more than IEC 61131-3 has words for: the task
 // file, from its text to the instance that runs.
+#include <cstdint>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -142,6 +143,119 @@ END_RESOURCE END_CONFIGURATION
   sut.reset();
   start(so("other"));
   EXPECT_EQ(sut->runtime().scheduler.view(), "CmpScheduleTimer");
+}
+
+struct OpenPlcImage {
+  std::uint8_t bits = 0, unused[2047]{};
+  std::int16_t words[2]{};
+};
+
+// A program as it is written for OpenPLC.
+TEST_P(TextWithATaskFile, HasLocationsOfOpenPlc) {
+  constexpr const char* kText = R"(
+PROGRAM Main
+  VAR button AT %IX0.0 : BOOL; level AT %IW0 : INT; END_VAR
+  VAR lamp AT %QX0.0 : BOOL; idle AT %QX0.1 : BOOL; speed AT %QW0 : INT; seen AT %QW1 : INT; END_VAR
+  lamp := button;
+  idle := NOT button;
+  speed := 800;
+  seen := level;
+END_PROGRAM
+CONFIGURATION cell RESOURCE press ON PLC
+  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+  PROGRAM one WITH fast : Main;
+END_RESOURCE END_CONFIGURATION
+)";
+  const ProgramEnd shared = build(kText, "open");
+  ASSERT_TRUE(shared.success()) << shared.output;
+  EXPECT_THAT(shared.output,
+              HasSubstr("open.st:3:32: note: %IW0 shares its bits with %IX0.0: a value at one "));
+  EXPECT_THAT(shared.output, HasSubstr("open.st:4:53: note: %QW0 shares its bits with %QX0.0, %QX0.1: "));
+  (void)sandbox.write("open.toml", "locations = 'separate'\n");
+  const ProgramEnd built = build(kText, "open");
+  ASSERT_TRUE(built.success()) << built.output;
+  EXPECT_THAT(built.output, Not(HasSubstr("shares its bits")));
+  EXPECT_THAT(
+      built.output,
+      HasSubstr("the outputs have %QX0.0 in bit 0 of byte 0, %QX0.1 in bit 1 of byte 0, %QW0 in bytes "
+                "2048 to 2049, %QW1 in bytes 2050 to 2051"));
+  image_bytes = 4096;
+  start(so("open"));
+  const auto has = [&](int bits, int seen) {
+    const auto now = outputs<OpenPlcImage>();
+    return now.bits == bits && now.words[0] == 800 && now.words[1] == seen;
+  };
+  EXPECT_TRUE(eventually([&] { return has(2, 0); }));
+  put(OpenPlcImage{.bits = 1, .words = {-7}});
+  EXPECT_TRUE(eventually([&] { return has(1, -7); }));
+  put(OpenPlcImage{.bits = 0, .words = {512}});
+  EXPECT_TRUE(eventually([&] { return has(2, 512); }));
+}
+
+// A program as it is written for Beremiz.
+TEST_P(TextWithATaskFile, HasLocationsOfSeveralNumbers) {
+  constexpr const char* kText = R"(
+PROGRAM Main
+  VAR raw AT %IW0.1.8192.0 : INT; twice AT %QW0.1.8193.0 : INT; END_VAR
+  VAR_EXTERNAL go : BOOL; lamp : BOOL; END_VAR
+  lamp := go;
+  twice := 2 * raw;
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL go AT %IX0.1.2 : BOOL; lamp AT %QX0.1.2 : BOOL; END_VAR
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM one WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+  const ProgramEnd chosen = build(kText, "devices");
+  ASSERT_TRUE(chosen.success()) << chosen.output;
+  EXPECT_THAT(chosen.output,
+              HasSubstr("devices.st:3:7: note: %IW0.1.8192.0 lies in bytes 2 to 3 of the inputs"));
+  EXPECT_THAT(chosen.output, HasSubstr("has the line \"%QX0.1.2\" = \"%QX0.0\""));
+  const auto works = [&] {
+    put(ImageIn{.bits = 1, .raw = 21});
+    EXPECT_TRUE(eventually([&] { return outputs().bits == 1 && outputs().twice == 42; }));
+    put(ImageIn{.bits = 0, .raw = -3});
+    EXPECT_TRUE(eventually([&] { return outputs().bits == 0 && outputs().twice == -6; }));
+  };
+  start(so("devices"));
+  works();
+  (void)sandbox.write("devices.toml",
+                      "[location]\n\"%IW0.1.8192.0\" = \"%IW1\"\n\"%QW0.1.8193.0\" = '%QW1'\n"
+                      "'%IX0.1.2' = '%IX0.0'\n'%QX0.1.2' = '%QX0.0'\n");
+  const ProgramEnd given = build(kText, "devices");
+  ASSERT_TRUE(given.success()) << given.output;
+  EXPECT_THAT(given.output, Not(HasSubstr("lies in")));
+  EXPECT_EQ(sut->ask(ControlVerb::change_application, so("devices")).code, ErrorCode::ok) << "same places";
+  works();
+}
+
+TEST_P(TextWithATaskFile, IsRefusedOnlineIfALocationWouldMove) {
+  constexpr const char* kText = R"(
+PROGRAM Main
+  VAR one AT %QW0.1 : INT; two AT %QW0.2 : INT; END_VAR
+  one := 1;
+  two := two + 1;
+END_PROGRAM
+CONFIGURATION cell RESOURCE press ON PLC
+  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+  PROGRAM main_1 WITH fast : Main;
+END_RESOURCE END_CONFIGURATION
+)";
+  ASSERT_TRUE(build(kText, "moved").success());
+  start(so("moved"));
+  std::string text = kText;
+  text.replace(text.find("%QW0.1"), 6, "%QW0.3");
+  ASSERT_TRUE(build(text, "other").success());
+  const ControlReply refused = sut->ask(ControlVerb::change_application, so("other"));
+  EXPECT_EQ(refused.code, ErrorCode::refused);
+  EXPECT_THAT(refused.text, HasSubstr("'location-QW0.2': qwLayout is 1, of the one that runs it is 17"));
+  (void)sandbox.write("other.toml", "[location]\n'%QW0.2' = '%QW1'\n'%QW0.3' = '%QW0'\n");
+  ASSERT_TRUE(build(text, "other").success());
+  const ControlReply kept = sut->ask(ControlVerb::change_application, so("other"));
+  EXPECT_EQ(kept.code, ErrorCode::ok) << kept.text;
 }
 
 }  // namespace

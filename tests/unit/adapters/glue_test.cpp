@@ -282,6 +282,55 @@ TEST_F(MatiecGlue, RefusesOutputsThatShareBitsInTwoTasks) {
       << "the second program has what the first one has written";
 }
 
+TEST_F(MatiecGlue, PlacesLocationsOfSeveralNumbers) {
+  const std::string programs =
+      "PROGRAM A VAR a AT %IW0.1.2 : INT; b AT %IW0.1.1 : INT; c AT %QW0 : INT; d AT %QW0.1 : INT; END_VAR "
+      "END_PROGRAM";
+  const std::vector<Located> located{{"INT", "__IW0_1_2", "%IW0.1.2"},
+                                     {"INT", "__IW0_1_1", "%IW0.1.1"},
+                                     {"INT", "__QW0", "%QW0"},
+                                     {"INT", "__QW0_1", "%QW0.1"}};
+  const std::string tasks = std::string(kFast) + "TASK slow (INTERVAL := T#1s, PRIORITY := 1); ";
+  const Glue chosen = write(programs, "", tasks + "PROGRAM one WITH fast : A;", located);
+  EXPECT_THAT(texts(chosen.problems), IsEmpty());
+  EXPECT_THAT(chosen.text, HasSubstr("{\"__IW0_1_2\", 'I', 2, -1, 0, 2u, &plchost_value_0}"));
+  EXPECT_THAT(chosen.text, HasSubstr("{\"__IW0_1_1\", 'I', 2, -1, 0, 0u, &plchost_value_1}"));
+  EXPECT_THAT(chosen.text, HasSubstr("{\"__QW0\", 'Q', 2, -1, 0, 0u, &plchost_value_2}"));
+  EXPECT_THAT(chosen.text, HasSubstr("plchost_location_count = 3;"));
+  EXPECT_THAT(chosen.text, HasSubstr("{\"location-IW0.1.1\", 1u, 0},\n  {\"location-IW0.1.2\", 17u, 0},\n"
+                                     "  {\"location-QW0.1\", 17u, 0},\n  {0}}"))
+      << "an online change compares them";
+  EXPECT_THAT(texts(chosen.remarks), Contains(HasSubstr("%IW0.1.2 lies in bytes 2 to 3 of the inputs.")));
+  const Glue one = write(programs, "", tasks + "PROGRAM one WITH fast : A; PROGRAM two WITH slow : A;",
+                         located, "[location]\n'%IW0.1.2' = '%IW5'\n'%IW0.1.1' = '%IW5'\n'%QW0.1' = '%QW0'");
+  EXPECT_THAT(texts(one.problems), IsEmpty());
+  EXPECT_THAT(one.text, HasSubstr("\"__IW0_1_2\", 'I', 2, -1, 0, 10u, "));
+  EXPECT_THAT(one.text, HasSubstr("static INT plchost_value_1;\nINT *__QW0 = &plchost_value_1;\n"
+                                  "INT *__QW0_1 = &plchost_value_1;\n"))
+      << "both names have one value";
+  EXPECT_THAT(one.text, HasSubstr("  __IW0_1_2 = &plchost_input_1_0;\n  __IW0_1_1 = &plchost_input_1_0;\n"))
+      << "and in each task one value of its own";
+  EXPECT_THAT(texts(one.remarks), Contains(HasSubstr("%QW0 shares its bits with %QW0.1")));
+}
+
+TEST_F(MatiecGlue, PlacesLocationsApartAsInOpenPlc) {
+  const std::vector<Located> located{{"INT", "__QW0", "%QW0"}, {"BOOL", "__QX0_1", "%QX0.1"}};
+  const std::string programs =
+      "PROGRAM A VAR a AT %QW0 : INT; END_VAR END_PROGRAM PROGRAM B VAR b AT %QX0.1 : BOOL; END_VAR "
+      "END_PROGRAM";
+  const std::string tasks = std::string(kFast) +
+                            "TASK slow (INTERVAL := T#1s, PRIORITY := 5); PROGRAM one WITH fast : A; "
+                            "PROGRAM two WITH slow : B;";
+  const Glue shared = write(programs, "", tasks, located);
+  EXPECT_THAT(texts(shared.problems), ElementsAre(HasSubstr("%QX0.1 and %QW0 share bits")));
+  EXPECT_THAT(texts(shared.remarks), ElementsAre(HasSubstr("a.st:1:15: %QW0 shares its bits with %QX0.1")));
+  const Glue apart = write(programs, "", tasks, located, "locations = 'separate'");
+  EXPECT_THAT(texts(apart.problems), IsEmpty()) << "each task has outputs of its own";
+  EXPECT_THAT(apart.text, HasSubstr("{\"__QW0\", 'Q', 2, -1, 0, 2048u, &plchost_value_0}"));
+  EXPECT_THAT(apart.text, HasSubstr("plchost_locations[] = {\n  {\"location-QW0\", 16385u, 0},\n  {0}}"));
+  EXPECT_THAT(apart.text, HasSubstr("{\"__QX0_1\", 'Q', 1, 1, 0, 0u, &plchost_value_1}"));
+}
+
 TEST_F(MatiecGlue, GivesEachTaskItsOwnValueOfAnInputOfItsPrograms) {
   const std::string slow =
       "TASK slow (INTERVAL := T#1s, PRIORITY := 5); PROGRAM one WITH fast : Main; PROGRAM two WITH slow : "

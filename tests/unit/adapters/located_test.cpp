@@ -1,5 +1,7 @@
 #include "instances/adapters/matiec/located.hpp"
 
+#include <utility>
+
 #include <gmock/gmock.h>
 
 #include "instances/adapters/iec/place.hpp"
@@ -7,8 +9,10 @@
 namespace plchost::matiec {
 namespace {
 
+using iec::location_of;
 using iec::Place;
 using iec::place_of;
+using iec::Widths;
 using testing::HasSubstr;
 using testing::SizeIs;
 
@@ -32,6 +36,41 @@ TEST(LocatedVariable, SaysWhatIsAllowed) {
   }
 }
 
+TEST(LocatedVariable, OfOpenPlcLiesBehindThoseOfSmallerWidth) {
+  const auto offset = [](const char* text) { return place_of(*location_of(text), Widths::separate)->offset; };
+  EXPECT_EQ(offset("%QX0.7"), 0U);
+  EXPECT_EQ(offset("%QX1023.7"), 1023U);
+  EXPECT_EQ(offset("%QB0"), 1024U);
+  EXPECT_EQ(offset("%QB1023"), 2047U);
+  EXPECT_EQ(offset("%QW0"), 2048U);
+  EXPECT_EQ(offset("%QW1023"), 4094U);
+  EXPECT_EQ(offset("%QD0"), 4096U);
+  EXPECT_EQ(offset("%QL0"), 8192U);
+  EXPECT_EQ(offset("%QL1023"), 16376U);
+  for (const char* const beyond : {"%QX1024.0", "%QB1024", "%QW1024", "%QD1024", "%QL1024"}) {
+    const auto none = place_of(*location_of(beyond), Widths::separate);
+    ASSERT_FALSE(none) << beyond;
+    EXPECT_THAT(none.error(), HasSubstr("allowed are the numbers 0 to 1023 there"));
+  }
+  for (const Widths widths : {Widths::shared, Widths::separate}) {
+    for (const char* const text : {"%IX3.5", "%QB7", "%MW1", "%ID1023", "%QL5"})
+      EXPECT_EQ(location_of(*place_of(*location_of(text), widths), widths).text(), text);
+  }
+}
+
+TEST(LocatedVariable, MayHaveSeveralNumbers) {
+  EXPECT_EQ(location_of("%qw0.1.8192.0")->text(), "%QW0.1.8192.0");
+  EXPECT_EQ(location_of("%I0.1.2")->text(), "%IX0.1.2");
+  for (const auto& [text, is_hierarchical] :
+       {std::pair{"%QX0.1", false}, std::pair{"%QX11", false}, std::pair{"%QX0.8", false},
+        std::pair{"%QX0.1.2", true}, std::pair{"%QW1", false}, std::pair{"%QW0.1", true}}) {
+    EXPECT_EQ(location_of(text)->is_hierarchical(), is_hierarchical) << text;
+  }
+  EXPECT_FALSE(location_of("%QW1..2"));
+  EXPECT_FALSE(location_of("%QW1.2.3.4.5.6.7.8.9.10.11.12.13.14.15.16.17"));
+  EXPECT_FALSE(location_of("%QW4294967296.0"));
+}
+
 TEST(LocatedVariable, IsReadFromTheFileOfTheCompilerWhoseEndIsNone) {
   const auto found =
       located_variables("__LOCATED_VAR(INT,__IW2,I,W,2)\nSTOP__LOCATED_VAR(BOOL,__QX0_1,Q,X,0,1)\nBOUND");
@@ -40,6 +79,8 @@ TEST(LocatedVariable, IsReadFromTheFileOfTheCompilerWhoseEndIsNone) {
   EXPECT_EQ(found[0].location, "%IW2");
   EXPECT_EQ(found[1].name, "__QX0_1");
   EXPECT_EQ(found[1].location, "%QX0.1");
+  EXPECT_EQ(located_variables("__LOCATED_VAR(INT,__QW0_1_8192_0,Q,W,0,1,8192,0)").at(0).location,
+            "%QW0.1.8192.0");
   EXPECT_THAT(located_variables("__LOCATED_VAR(\n__LOCATED_VAR(a,b)\n)"), SizeIs(0));
 }
 

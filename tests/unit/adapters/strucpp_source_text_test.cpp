@@ -38,6 +38,16 @@ TEST(SourceTextForStrucpp, HasTheGlobalsOfItsOnlyResourceInItsConfiguration) {
   EXPECT_THAT(made.inserted, ElementsAre(FieldsAre(4U, 37U, 18U)));
 }
 
+TEST(SourceTextForStrucpp, HasNoLocationsOfSeveralNumbersInItsGlobals) {
+  const SourceText made = text_of(
+      "CONFIGURATION c\nVAR_GLOBAL RETAIN a AT %IX0.1.2 : BOOL; b AT %QW0 : INT;\n"
+      "c, d AT %qw0.1 : INT; END_VAR\nEND_CONFIGURATION");
+  EXPECT_EQ(made.text,
+            "CONFIGURATION c\nVAR_GLOBAL RETAIN a             : BOOL; b AT %QW0 : INT;\n"
+            "c, d           : INT; END_VAR\nEND_CONFIGURATION");
+  EXPECT_THAT(made.places, ElementsAre(FieldsAre(2U, "A", "%IX0.1.2"), FieldsAre(3U, "C", "%QW0.1")));
+}
+
 TEST(SourceTextForStrucpp, HasTheResourcesAsTheyAreIfThereAreSeveralOrTheyHaveNoGlobals) {
   for (const std::string text :
        {"CONFIGURATION c RESOURCE r ON PLC VAR_GLOBAL a : INT; END_VAR END_RESOURCE RESOURCE s ON PLC "

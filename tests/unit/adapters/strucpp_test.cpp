@@ -109,6 +109,26 @@ TEST(StrucppGlue, RunsEachTaskByItself) {
               Contains("a.st:13:5: PROGRAM rest has no TASK: it runs freewheeling, with priority 31"));
 }
 
+TEST(StrucppGlue, PlacesLocationsAsTheTaskFileSays) {
+  Parts parts;
+  parts.main += "," + variable("HIGH", "INT", "at=%QW0.1.8192.1") + "," +
+                variable("LOW", "INT", "at=%QW0.1.8192.0") + "," + variable("LAMP", "BOOL", "at=%QX0.0");
+  const iec::Glue chosen = glue_of(parts);
+  EXPECT_THAT(texts(chosen.problems), IsEmpty());
+  EXPECT_THAT(chosen.text, HasSubstr("{\"ONE.HIGH\", 'Q', 2, -1, 0, 4u, &*g_config.ONE.HIGH.raw_ptr()}"));
+  EXPECT_THAT(chosen.text, HasSubstr("{\"ONE.LOW\", 'Q', 2, -1, 0, 2u, &*g_config.ONE.LOW.raw_ptr()}"));
+  EXPECT_THAT(
+      texts(chosen.remarks),
+      Contains("a.st:4:7: %QW0.1.8192.0 lies in bytes 2 to 3 of the outputs. It may move in a later "
+               "build, unless [location] of the task file has the line \"%QW0.1.8192.0\" = \"%QW1\""));
+  const iec::Glue given = glue_of(
+      parts, "locations = 'separate'\n[location]\n'%QW0.1.8192.0' = '%QW7'\n'%QW0.1.8192.1' = '%QW7'");
+  EXPECT_THAT(given.text, HasSubstr("{\"ONE.LOW\", 'Q', 2, -1, 1, 2062u, "));
+  EXPECT_THAT(given.text, HasSubstr("{\"ONE.LAMP\", 'Q', 1, 0, 0, 0u, "));
+  EXPECT_THAT(given.text, HasSubstr("{\"ONE.RAW\", 'I', 2, -1, 0, 2050u, "));
+  EXPECT_THAT(texts(given.remarks), Contains(HasSubstr("%QW0.1.8192.0 shares its bits with %QW0.1.8192.1")));
+}
+
 TEST(StrucppGlue, ExchangesTheVariablesWhereTheyLie) {
   const iec::Glue glue = glue_of({});
   EXPECT_THAT(glue.text, HasSubstr("{\"ONE.RAW\", 'I', 2, -1, 0, 2u, &*g_config.ONE.RAW.raw_ptr()},\n"

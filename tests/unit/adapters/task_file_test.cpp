@@ -142,7 +142,8 @@ TEST_F(TaskFile, RefusesKeysThatItDoesNotKnow) {
   EXPECT_THAT(
       problems("[tasks.fast]\n[resource.press]\nx = 1"),
       ElementsAre(
-          "a.toml:1:2: 'tasks' is not expected here; allowed are scheduler, [task.NAME], "
+          "a.toml:1:2: 'tasks' is not expected here; allowed are scheduler, locations, [location], "
+          "[task.NAME], "
           "[program.NAME], [resource.NAME.task.NAME] and [resource.NAME.program.NAME]",
           "a.toml:3:1: 'x' is not expected here; allowed are scheduler, [resource.NAME.task.NAME] and "
           "[resource.NAME.program.NAME]"));
@@ -160,6 +161,40 @@ TEST_F(TaskFile, NamesTheSchedulerOfAllResourcesAndOfOne) {
       problems("scheduler = 'CmpScheduleTimer'\n[resource.press]\nscheduler = 'CmpScheduleOneShot'\n"),
       IsEmpty());
   EXPECT_EQ(configuration.resources.front().scheduler, "CmpScheduleOneShot");
+}
+
+TEST_F(TaskFile, PlacesLocations) {
+  EXPECT_THAT(problems("locations = 'separate'\n[location]\n'%iw0.0.0.2' = '%iw2'\n\"%QX0.1.2\" = '%Q9'\n"),
+              IsEmpty());
+  EXPECT_EQ(configuration.locations.widths, Widths::separate);
+  const auto& given = configuration.locations.given;
+  ASSERT_EQ(given.size(), 2U);
+  EXPECT_EQ(given.at(*location_of("%IW0.0.0.2")).location, *location_of("%IW2"));
+  EXPECT_EQ(given.at(*location_of("%IW0.0.0.2")).place, (SourcePlace{"a.toml", 3, 1}));
+  EXPECT_EQ(given.at(*location_of("%QX0.1.2")).location, *location_of("%QX1.1"));
+  EXPECT_THAT(problems("locations = 'shared'"), IsEmpty());
+  EXPECT_EQ(configuration.locations.widths, Widths::shared);
+}
+
+TEST_F(TaskFile, RefusesWhatPlacesNoLocation) {
+  for (const char* const text : {"locations = 'apart'", "locations = true"}) {
+    EXPECT_THAT(problems(text), ElementsAre(HasSubstr("is not known; allowed are shared, separate"))) << text;
+  }
+  EXPECT_THAT(problems("location = 1"), ElementsAre("a.toml:1:1: 1 is no table; write [location]"));
+  EXPECT_THAT(problems("[location]\n'%AW0' = '%IW0'\nIW0 = '%IW0'"),
+              ElementsAre("a.toml:2:1: '%AW0' is no location; a line of [location] is like \"%IW0.0.0.2\" = "
+                          "\"%IW2\"",
+                          HasSubstr("a.toml:3:1: 'IW0' is no location")));
+  for (const char* const place : {"'%IX0.0'", "'%QW0'", "'%ID0'", "'%IW0.1'", "'IW0'", "''", "7"}) {
+    EXPECT_THAT(problems(std::string("[location]\n'%IW0.1.2' = ") + place),
+                ElementsAre(testing::AllOf(
+                    HasSubstr("a.toml:2:1: location %IW0.1.2: "),
+                    HasSubstr("is not allowed; allowed is a place of its area and width, like \"%IW2\""))))
+        << place;
+  }
+  EXPECT_THAT(problems("[location]\n'%Q0.1.2' = '%QB0'"), ElementsAre(HasSubstr("like \"%QX2.0\"")));
+  EXPECT_THAT(problems("[location]\n'%IW0.1' = '%IW1'\n'%iw0.1' = '%IW2'"),
+              ElementsAre(HasSubstr("the location %IW0.1 is given in line 2, too; remove one of both")));
 }
 
 struct Bad {
