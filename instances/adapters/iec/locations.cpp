@@ -145,7 +145,7 @@ void Locations::name_separate(SourceProblems& remarks) const {
       if (entry.first.area == area && entry.second.place) order.emplace_back(*entry.second.place, &entry);
     }
     if (order.empty()) continue;
-    std::ranges::stable_sort(order, {}, &decltype(order)::value_type::first);
+    std::ranges::sort(order, {}, [](const auto& one) { return std::pair(one.first, one.second->first); });
     std::vector<std::string> texts;
     for (const auto& [place, entry] : order)
       texts.push_back(fmt::format("{} in {}", entry->first.text(), bytes_of(place)));
