@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,7 +15,11 @@ namespace {
 
 struct Moment {
   std::size_t ring = 0;
+  std::size_t number = 0;  // among those of its ring
   FlightEntry entry;
+
+  // In the order of the times; in a ring those of one time stay as they are.
+  [[nodiscard]] auto order() const noexcept { return std::tuple(entry.time_ns, ring, number); }
 };
 
 // Of one instance: the names of its tasks, and the events that they run for.
@@ -118,9 +123,10 @@ std::vector<Moment> last_moments(const Page& page, std::size_t rings, std::int64
       return entry.kind == FlightKind::none || entry.time_ns < 0 || entry.time_ns > until_ns;
     });
     const std::size_t share = std::min(entries.size(), share_of(rings));
-    for (std::size_t i = entries.size() - share; i < entries.size(); ++i) all.push_back({ring, entries[i]});
+    for (std::size_t i = entries.size() - share; i < entries.size(); ++i)
+      all.push_back({ring, i, entries[i]});
   }
-  std::ranges::stable_sort(all, {}, [](const Moment& moment) { return moment.entry.time_ns; });
+  std::ranges::sort(all, {}, &Moment::order);
   if (all.size() > kMostActivity) all.erase(all.begin(), all.end() - kMostActivity);
   return all;
 }

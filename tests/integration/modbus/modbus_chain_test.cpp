@@ -211,7 +211,8 @@ writable = true
     ASSERT_EQ(modbus_write_bit(client, 1, value % 2), 1);
     ASSERT_EQ(holding(0), value);
   }
-  EXPECT_TRUE(eventually([&] { return holding(2) == 500 && coil(2) == 0; })) << "what the program has seen";
+  EXPECT_TRUE(eventually([&] { return holding(2) == 500 && coil(2) == 0; }))
+      << "as the program has seen them";
   EXPECT_EQ(modbus_write_bit(client, 1, 1), 1);
   EXPECT_TRUE(eventually([&] { return coil(2) == 1; }));
   EXPECT_NE(holding(1), before) << "the program runs";
