@@ -193,11 +193,13 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
     const FaultRecord* const record = tasks_[i]->fault().published();
     if (record == nullptr || fault_taken_[i]) continue;
     fault_taken_[i] = true;
-    environment_.control_flight.put(time_of(*record), FlightKind::fault,
+    const TimePoint time = time_of(*record);
+    environment_.control_flight.put(time, FlightKind::fault,
                                     fault_figure(i, std::to_underlying(record->kind)));
     return Fault{.task = i,
                  .name = tasks_[i]->config().name,
                  .record = *record,
+                 .time = time,
                  .back_trace = tasks_[i]->fault().back_trace(),
                  .whole_application = fault_board_.halted()};
   }

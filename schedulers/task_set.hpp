@@ -196,6 +196,7 @@ class TaskSet {
     std::size_t task = 0;  ///< its index
     std::string name;
     FaultRecord record;
+    TimePoint time;  ///< as the flight recorder has it
     BackTrace back_trace;
     bool whole_application = true;  ///< false: the policy is `task`, the others run on
   };

@@ -112,11 +112,7 @@ std::string bounded_text(ExceptionHistory history) {
   std::string text = to_text(history);
   for (ExceptionEntry& entry : history.entries) {
     if (text.size() <= kMaxFile) return text;
-    if (entry.activity.empty()) continue;
-    entry.activity.clear();
-    text = to_text(history);
-  }
-  for (ExceptionEntry& entry : history.entries) {
+    if (!std::exchange(entry.activity, {}).empty()) text = to_text(history);
     if (text.size() <= kMaxFile) return text;
     if (entry.back_trace.empty()) continue;
     entry.back_trace.clear();

@@ -24,7 +24,8 @@ namespace status_rows {
 
 template <class Value>
 void add(Row& row, const dds::FieldInfo& field, const Value& value) {
-  const std::string name(field.row);
+  const std::string name =
+      field.unit == dds::Unit::duration ? fmt::format("{}_us", field.base) : std::string(field.row);
   if constexpr (std::same_as<Value, Row> || std::same_as<Value, bool>) {
     row[name] = value;
   } else if constexpr (std::integral<Value>) {
@@ -33,7 +34,7 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
     } else if (!field.words.empty()) {
       row[name] = dds::word_for(field.words, static_cast<std::uint64_t>(value));
     } else if (field.unit == dds::Unit::duration) {
-      row[fmt::format("{}_us", field.base)] = to_us(static_cast<std::int64_t>(value));
+      row[name] = to_us(static_cast<std::int64_t>(value));
     } else if (field.unit == dds::Unit::unix) {
       row[std::string(field.base)] = time_text(static_cast<std::int64_t>(value));
       row[name] = value;

@@ -169,10 +169,10 @@ std::string format_exception(Row row) {
     row[field] = address != 0 ? fmt::format("{:#x}", address) : "";
   }
   row.erase("time_unix_ns");
-  constexpr double kNsPerSecond = 1e9;
-  if (row["uptime_ns"].is_number())
-    row["uptime"] = fmt::format("{:.1f} s", row["uptime_ns"].get<double>() / kNsPerSecond);
-  row.erase("uptime_ns");
+  constexpr double kUsPerSecond = 1e6;
+  if (row["uptime_us"].is_number())
+    row["uptime"] = fmt::format("{:.1f} s", row["uptime_us"].get<double>() / kUsPerSecond);
+  row.erase("uptime_us");
   if (row["settings"].get_ref<const std::string&>().empty()) row.erase("cycles");
   const Row end = row["back_trace_end"];  // beside the back-trace
   row.erase("back_trace_end");

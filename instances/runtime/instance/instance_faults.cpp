@@ -116,7 +116,7 @@ ExceptionEntry Instance::keep_fault(const TaskSet::Fault& fault) {
   page_->set_task_state(static_cast<std::uint32_t>(fault.task), PageTaskState::exception);
   ExceptionEntry entry = entry_of(fault, application_->path());
   entry.circumstances = circumstances_of(fault.task);
-  if (flight_) entry.activity = activity_before(*flight_, time_of(fault.record));
+  if (flight_) entry.activity = activity_before(*flight_, fault.time);
   spdlog::error("exception: {}", reason_of(entry));
   write_down(entry);
   return entry;

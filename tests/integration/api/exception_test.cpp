@@ -192,7 +192,7 @@ TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
   EXPECT_EQ(json[0]["address"], 0x7f0012345678);
   EXPECT_EQ(json[0]["time_unix_ns"], 1'789'000'000'123'456'789);
   EXPECT_EQ(json[0]["stopped"], "application");
-  EXPECT_EQ(json[0]["uptime_ns"], 12'345'000'000);
+  EXPECT_EQ(json[0]["uptime_us"], 12'345'000.0);
   EXPECT_EQ(json[0]["version"], "0.1.0");
   EXPECT_EQ(json[0]["build"], "GCC 12");
   EXPECT_EQ(json[0]["build_id"], "4f");

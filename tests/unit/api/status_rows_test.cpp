@@ -76,7 +76,7 @@ TEST(StatusRows, OfAnExceptionSayWhatWasStopped) {
       R"({"host":"hosta","instance":"line1","count":0,"present":false,"time":"","time_unix_ns":0,)"
       R"("task":"","stopped":"","kind":"none","signal":"","text":"","address":0,"symbol":"",)"
       R"("memory_address":0,"application":"","back_trace":"","back_trace_end":"","activity":"",)"
-      R"("version":"","build":"","build_id":"","scheduler":"","settings":"","cycles":0,"uptime_ns":null})");
+      R"("version":"","build":"","build_id":"","scheduler":"","settings":"","cycles":0,"uptime_us":null})");
   exception.count = 1;
   EXPECT_EQ(to_row(exception).at("stopped"), "task");
   exception.whole_application = true;

@@ -1,5 +1,6 @@
 #include "shm/pages/exception_history.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -260,9 +261,28 @@ TEST_F(ExceptionHistoryTest, DropsTheOldestBackTracesUntilItsReaderTakesIt) {
   ASSERT_TRUE(back) << back.error().describe();
   EXPECT_EQ(back->count, 16U);
   ASSERT_EQ(back->entries.size(), 16U);
+  EXPECT_TRUE(back->entries.front().activity.empty());
   EXPECT_TRUE(back->entries.front().back_trace.empty());
   EXPECT_EQ(back->entries.front().back_trace_end, "it was dropped for those of newer exceptions");
   EXPECT_EQ(back->entries.back(), history.entries.back());
+}
+
+TEST_F(ExceptionHistoryTest, DropsOldActivitiesBeforeTheBackTraceBesideThem) {
+  ExceptionHistory history;
+  for (int i = 1; i <= 16; ++i) {
+    ExceptionEntry fault = entry("abort");
+    fault.activity.assign(128, std::string(125, '-'));
+    history.add(fault);
+  }
+  ASSERT_TRUE(write_exceptions(path_, history));
+  const auto back = read_exceptions(path_);
+  ASSERT_TRUE(back) << back.error().describe();
+  ASSERT_EQ(back->entries.size(), 16U);
+  EXPECT_EQ(back->entries.back(), history.entries.back());
+  const auto whole =
+      std::ranges::find_if(back->entries, [](const auto& one) { return !one.activity.empty(); });
+  EXPECT_NE(whole, back->entries.begin());
+  EXPECT_FALSE(whole->back_trace.empty());
 }
 
 TEST_F(ExceptionHistoryTest, DropsTheOldestEntriesUntilItsReaderTakesIt) {

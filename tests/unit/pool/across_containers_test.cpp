@@ -352,7 +352,7 @@ TEST_F(AcrossContainers, PoolOfThatKindHasAnotherVersionSoThatOlderProgramsRefus
   EXPECT_TRUE(pool_.across_containers());
   EXPECT_TRUE(another().across_containers());
   const auto memory = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_only);
-  EXPECT_EQ(reinterpret_cast<const PoolHeader*>(memory->bytes().data())->version, 7U);
+  EXPECT_EQ(reinterpret_cast<const PoolHeader*>(memory->bytes().data())->version, kPoolVersionAcross);
   const UniquePoolName plain;
   const auto pool = std::move(ObjectPool::create(plain.get(), {.max_objects = kAcrossRoom}).value());
   EXPECT_FALSE(pool.across_containers());

@@ -20,6 +20,8 @@ const struct plchost_place plchost_places[] = {
     {"__MX8_2", 'M', 1, 2, 0, 8, &lamp},     {"__MW5", 'M', 2, -1, 0, 10, &torn},
     {"__MD3", 'M', 4, -1, 0, 12, &wide}};
 unsigned long long plchost_exchanged[9];
+const unsigned int plchost_location_count = 0;
+struct plchost_location plchost_locations[] = {{0, 0, 0}};
 
 static struct plchost_use of_fast[] = {{0, &set_point, 0, 0}, {1, &count, 0, 0},   {2, &echo, 0, 0},
                                        {3, &lost, 0, 0},      {4, &toggles, 0, 0}, {5, &wanted, 0, 0},
