@@ -123,6 +123,7 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
       lock_(std::move(lock)),
       reactor_(std::move(reactor)),
       wish_writer_(*reactor_, "/proc/self/exe"),
+      // NOLINTNEXTLINE(bugprone-throw-keyword-missing): a member, of which none is thrown
       exceptions_(wish_writer_, state_disk_,
                   {.folder = exceptions_folder(config_.host.state_directory, config_.host.name),
                    .run_directory = config_.host.run_directory}),

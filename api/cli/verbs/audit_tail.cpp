@@ -73,6 +73,7 @@ Result<std::vector<Row>> audit_tail(const std::string& folder, const std::string
                                     std::size_t most) {
   PLCHOST_TRY_ASSIGN(const auto files, audit_files(folder));
   std::vector<Row> newest;
+  const Row of_the_host = "";
   std::uint64_t left = kMostBytes;
   for (const AuditFile& file : files | std::views::reverse) {
     if (left == 0 || newest.size() >= most) break;
@@ -82,7 +83,7 @@ Result<std::vector<Row>> audit_tail(const std::string& folder, const std::string
       Row record = Row::parse(line, nullptr, false);
       if (!record.is_object()) continue;
       const Row on = record.value("on", Row());
-      if (on != instance && on != "") continue;
+      if (on != instance && on != of_the_host) continue;
       for (const char* const chain : {"before", "hash"}) record.erase(chain);
       leave_out_value(record);
       newest.push_back(std::move(record));

@@ -441,8 +441,11 @@ TEST_F(TranslatedByStrucpp, ThatReadsBeyondAnArrayStopsByAnException) {
   text.replace(text.find("of_shift[1] := "), 15, "of_shift[REAL_TO_INT(3.0)] := ");
   const ProgramEnd built = build(text, "beyond", "strucpp");
   ASSERT_TRUE(built.success()) << built.output;
-  start(so("beyond"));
-  EXPECT_TRUE(eventually([&] { return sut->task("fast")->state == PageTaskState::exception; }));
+  sut.emplace(sandbox, std::vector<std::string>{"--application", so("beyond")});
+  EXPECT_TRUE(eventually([&] {
+    const auto task = sut->task("fast");
+    return task && task->state == PageTaskState::exception;
+  })) << sut->log();
 }
 
 TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
