@@ -168,7 +168,7 @@ Result<FlightPageReader> FlightPageReader::open(std::string_view pool, std::stri
 }
 
 std::string FlightPageReader::task_name(std::size_t index) const {
-  FixedText<kMaxTaskName> name = flight_task_of(memory_, index).name;
+  const FixedText<kMaxTaskName> name = flight_task_of(memory_, index).name;
   return printable(std::string(name.view()));
 }
 
