@@ -42,7 +42,7 @@ void show_activity(plc_ExceptionStatus& sample, const ExceptionEntry& entry) {
   dds::copy_text(sample.activity, fmt::format("{}", fmt::join(first.base(), entry.activity.end(), "\n")));
 }
 
-// "GCC 12, build ID 4f": both together have no room in one value.
+// Of "GCC 12, build ID 4f", as the file has it: the contract has both apart.
 std::pair<std::string_view, std::string_view> parts_of_build(std::string_view build) {
   constexpr std::string_view kBuildId = "build ID ";
   constexpr std::string_view kBetween = ", ";

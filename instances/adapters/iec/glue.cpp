@@ -123,11 +123,8 @@ void GlueWriter::write_locations() {
   const auto moved = plan_.locations.not_by_numbers();
   for (const auto& [location, place] : moved)
     table += fmt::format("  {{\"location-{}\", {}u, 0}},\n", location.substr(1), first_bit(place) + 1);
-  print(
-      "const unsigned int plchost_location_count = {};\nstruct plchost_location plchost_locations[] = {{\n{} "
-      " "
-      "{{0}}}};\n",
-      moved.size(), table);
+  print("const unsigned int plchost_location_count = {};\n", moved.size());
+  print("struct plchost_location plchost_locations[] = {{\n{}  {{0}}}};\n", table);
 }
 
 // In the order of their begins. One that begins before the others have ended shares bits.

@@ -60,7 +60,7 @@ class Rewriter {
       if (token.is("END_PROGRAM")) in_program_ = false;
       if (token.is("CONFIGURATION")) read_configuration();
       if (token.is("VAR_EXTERNAL") && this->token(1).is("CONSTANT")) give_values();
-      if (in_program_ && is_section(token)) read_section();
+      if (in_program_ && is_section(token)) read_section([](const iec::Location&) { return true; });
     }
     hide_places();
     move_resource();
@@ -88,32 +88,26 @@ class Rewriter {
     made_.text.replace(token.offset, token.text.size(), with_dot(token.text));
   }
 
-  // VAR RETAIN a, b AT %QX0.1 : BOOL; ... END_VAR
-  void read_section() {
+  // VAR RETAIN a, b AT %QX0.1 : BOOL; ... END_VAR. `hides`: whether the compiler is not to see a location.
+  template <class Hides>
+  void read_section(const Hides& hides) {
     ++next_;
     while (token().is("RETAIN") || token().is("NON_RETAIN") || token().is("CONSTANT")) ++next_;
     const Token* first = &token();  // of the declaration
     for (; !at_end() && !token().is("END_VAR"); ++next_) {
       if (token().kind == Token::Kind::literal) name_by_dot(token());
       if (token().is(";")) first = &token(1);
-      if (token().is("AT") && token(1).kind == Token::Kind::place && iec::location_of(token(1).text))
-        places_.push_back({first, &token(), &token(1)});
+      if (!token().is("AT") || token(1).kind != Token::Kind::place) continue;
+      const auto location = iec::location_of(token(1).text);
+      if (location && hides(*location)) places_.push_back({first, &token(), &token(1)});
     }
   }
 
   // Those of several numbers: the compiler refuses them.
   void read_globals() {
     for (next_ = 0; !at_end(); ++next_) {
-      if (!token().is("VAR_GLOBAL")) continue;
-      ++next_;
-      while (token().is("RETAIN") || token().is("NON_RETAIN") || token().is("CONSTANT")) ++next_;
-      const Token* first = &token();  // of the declaration
-      for (; !at_end() && !token().is("END_VAR"); ++next_) {
-        if (token().is(";")) first = &token(1);
-        if (!token().is("AT") || token(1).kind != Token::Kind::place) continue;
-        const auto location = iec::location_of(token(1).text);
-        if (location && !location->is_direct()) places_.push_back({first, &token(), &token(1)});
-      }
+      if (token().is("VAR_GLOBAL"))
+        read_section([](const iec::Location& location) { return !location.is_direct(); });
     }
   }
 
