@@ -40,9 +40,10 @@ extern "C" {
 
 /* Names variables that an online change carries over: dwBytes at pAddress, which are copied to where the new
  * version has its variable of this name. Your qwLayout changes when the meaning of the bytes does.
- * A variable that only the new version names keeps its initial value. From plc_app_init only. ERR_OK;
- * ERR_PARAMETER: null, no bytes, or pszName is not 1 to PLC_MAX_VARIABLE_NAME letters, digits, _ - . ;
- * ERR_DUPLICATE: one of that name; ERR_NOMEMORY: too many, or too many bytes; ERR_NOTINITIALIZED. Control. */
+ * A variable that only the new version names keeps its initial value. Null and 0 bytes: nothing is copied,
+ * and qwLayout is compared all the same. From plc_app_init only. ERR_OK; ERR_PARAMETER: one of the two, or
+ * pszName is not 1 to PLC_MAX_VARIABLE_NAME letters, digits, _ - . ; ERR_DUPLICATE: one of that name;
+ * ERR_NOMEMORY: too many, or too many bytes; ERR_NOTINITIALIZED. Control. */
 RTS_RESULT CDECL plc_keep_variables(const char* pszName, void* pAddress, unsigned int dwBytes,
                                     RTS_UI64 qwLayout);
 

@@ -82,7 +82,7 @@ int plc_online_change(void) {
   return 0;
 }
 RTS_RESULT plc_keep_variables(const char* name, void* address, unsigned int bytes, RTS_UI64) {
-  return name != NULL && address != NULL && bytes != 0 ? ERR_OK : ERR_PARAMETER;
+  return name != NULL && (address == NULL) == (bytes == 0) ? ERR_OK : ERR_PARAMETER;
 }
 void plc_apply_forces(void) {}
 void plc_log(int level, const char* text) {

@@ -8,9 +8,10 @@
  * other bits of their bytes, as the tasks that use those have put them last. Places that share bits are taken
  * at the begin, and put out if they changed.
  *
- * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last. It is
- * put out if the program's value does. So neither a task that interrupts this one nor firmware is undone. If
- * both have changed it in one cycle, the program's value holds.
+ * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last, and
+ * the program's value does not. It is put out if the program's value does: by a task that has changed it, or
+ * by the last one that uses it. So neither a task that interrupts this one nor firmware is undone. If both
+ * have changed it in one cycle, the program's value holds.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -124,32 +125,45 @@ static void find_areas(unsigned char* found[AREAS]) {
   for (i = 0; i < AREAS; ++i) found[i] = areas[i].bytes == 0 ? NULL : plc_area_address(areas[i].handle);
 }
 
+/* Unless a task that came between has exchanged another one. */
+static void exchange(unsigned int number, unsigned long long last, unsigned long long now) {
+  __atomic_compare_exchange_n(&plchost_exchanged[number], &last, now, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
+}
+
+/* A value that is none of before is one that a task has assigned and not put yet. */
 static void take_memory(unsigned int number, const unsigned char* area) {
   const struct plchost_place* const place = &plchost_places[number];
-  unsigned long long* const exchanged = &plchost_exchanged[number];
-  const unsigned long long last = __atomic_load_n(exchanged, __ATOMIC_SEQ_CST);
+  const unsigned long long last = __atomic_load_n(&plchost_exchanged[number], __ATOMIC_SEQ_CST);
   const unsigned long long before = value_at(place->value, place->bytes);
   const unsigned long long now = load(place, area);
-  if (now != last && set_value_if(place->value, place->bytes, before, now))
-    __atomic_store_n(exchanged, now, __ATOMIC_SEQ_CST);
+  if (now != last && value_of(place, &before) == last &&
+      set_value_if(place->value, place->bytes, before, now))
+    exchange(number, last, now);
 }
+
+/* For each place of the memory: tasks that are in a cycle and use it. */
+static unsigned int* users_now = NULL;
 
 /* First into the area: a task that comes between the two takes what is there already. */
-static void put_memory(unsigned int number, unsigned char* area) {
-  const struct plchost_place* const place = &plchost_places[number];
-  unsigned long long* const exchanged = &plchost_exchanged[number];
+static void put_memory(const struct plchost_use* use, unsigned char* area, int others) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  const unsigned long long last = __atomic_load_n(&plchost_exchanged[use->place], __ATOMIC_SEQ_CST);
   const unsigned long long value = value_of(place, place->value);
-  if (value == __atomic_load_n(exchanged, __ATOMIC_SEQ_CST)) return;
+  if (value == last || (value == use->before && others)) return;
   store(place, area, value);
-  __atomic_store_n(exchanged, value, __ATOMIC_SEQ_CST);
+  exchange(use->place, last, value);
 }
 
-/* Of another version, whose values this one has: then they are those that were put last. */
-static void find_put(void) {
+/* An online change: this program takes over from one that runs. */
+static int takes_over = 0;
+
+/* Of another version, whose values this one has: then they are those that were exchanged last. */
+static void find_exchanged(void) {
   unsigned int i;
   for (i = 0; i < plchost_place_count; ++i) {
     const struct plchost_place* const place = &plchost_places[i];
-    if (place->area == 'Q') plchost_exchanged[i] = value_of(place, place->value);
+    if (place->area == 'Q' || (place->area == 'M' && takes_over))
+      plchost_exchanged[i] = value_of(place, place->value);
   }
 }
 
@@ -170,7 +184,7 @@ void plchost_take_places(const struct plchost_task* task) {
   unsigned char* found[AREAS];
   unsigned int i;
   if (!__atomic_load_n(&is_known, __ATOMIC_SEQ_CST)) {
-    find_put();
+    find_exchanged();
     __atomic_store_n(&is_known, 1, __ATOMIC_SEQ_CST);
   }
   find_areas(found);
@@ -179,7 +193,9 @@ void plchost_take_places(const struct plchost_task* task) {
     const struct plchost_place* const place = &plchost_places[use->place];
     const unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
+      __atomic_add_fetch(&users_now[use->place], 1, __ATOMIC_SEQ_CST);
       take_memory(use->place, area);
+      use->before = value_of(place, place->value);
     } else if (place->area == 'I' || place->aliased) {
       use->before = load(place, area);
       set_value(use->value, place->bytes, use->before);
@@ -196,7 +212,7 @@ void plchost_put_places(const struct plchost_task* task) {
     const struct plchost_place* const place = &plchost_places[use->place];
     unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
-      put_memory(use->place, area);
+      put_memory(use, area, __atomic_sub_fetch(&users_now[use->place], 1, __ATOMIC_SEQ_CST) != 0);
     } else if (place->area == 'Q') {
       put_output(use, area);
     }
@@ -215,10 +231,12 @@ void plchost_exchange_places(const struct plchost_task* task) {
       unsigned char* const area = found[area_of(place) - areas];
       if (!place->aliased || place->area == 'I') continue;
       if (place->area == 'M') {
-        if (step == 0)
-          put_memory(use->place, area);
-        else
+        if (step == 0) {
+          put_memory(use, area, 1);
+        } else {
           take_memory(use->place, area);
+          use->before = value_of(place, place->value);
+        }
       } else if (step == 0) {
         put_output(use, area);
       } else {
@@ -276,7 +294,8 @@ static int allocate_areas(void) {
   if (bytes == 0) return 1;
   initial_bytes = calloc(bytes, 1);
   area_users = calloc(AREAS * plchost_task_count, sizeof *area_users);
-  if (initial_bytes == NULL || area_users == NULL) return 0;
+  users_now = calloc(plchost_place_count, sizeof *users_now);
+  if (initial_bytes == NULL || area_users == NULL || users_now == NULL) return 0;
   bytes = 0;
   for (i = 0; i < AREAS; ++i) {
     areas[i].initial = initial_bytes + bytes;
@@ -308,6 +327,7 @@ static int declare(struct area* area) {
 
 int plchost_declare_places(void) {
   unsigned int i;
+  takes_over = plc_online_change();
   for (i = 0; i < plchost_place_count; ++i) {
     const struct plchost_place* const place = &plchost_places[i];
     plchost_exchanged[i] = value_of(place, place->value);
@@ -315,8 +335,8 @@ int plchost_declare_places(void) {
     if (plc_keep_variables(place->name, place->value, place->bytes, 0) != ERR_OK) return 0;
   }
   for (i = 0; i < plchost_location_count; ++i) {
-    struct plchost_location* const location = &plchost_locations[i];
-    if (plc_keep_variables(location->name, &location->kept, 1, location->layout) != ERR_OK) return 0;
+    const struct plchost_location* const location = &plchost_locations[i];
+    if (plc_keep_variables(location->name, NULL, 0, location->layout) != ERR_OK) return 0;
   }
   if (!allocate_areas()) return 0;
   for (i = 0; i < AREAS; ++i) {
@@ -328,4 +348,5 @@ int plchost_declare_places(void) {
 void plchost_forget_places(void) {
   free(initial_bytes);
   free(area_users);
+  free(users_now);
 }

@@ -24,11 +24,11 @@ struct plchost_place {
   void* value;
 };
 
-/* A location whose numbers do not tell its place. An online change is refused if that is another one. */
+/* A location of the program, whose place a task file may choose. An online change is refused if both versions
+ * have it at different ones. */
 struct plchost_location {
   const char* name;
   unsigned int layout; /* the first bit of its place, plus 1 */
-  unsigned char kept;  /* nothing: a name needs variables to be kept */
 };
 
 /* A place that a task exchanges with its area. */
@@ -119,7 +119,7 @@ extern const unsigned int plchost_place_count;
 extern const struct plchost_place plchost_places[];
 extern unsigned long long plchost_exchanged[]; /* for each place, not in the inputs */
 extern const unsigned int plchost_location_count;
-extern struct plchost_location plchost_locations[];
+extern const struct plchost_location plchost_locations[];
 void plchost_each_variable(void (*use)(const struct plchost_variable*));
 void plchost_each_symbol(void (*use)(const struct plchost_symbol*));
 void plchost_bind(void); /* makes the program ready for its first cycle */

@@ -120,11 +120,11 @@ void GlueWriter::write_places() {
 
 void GlueWriter::write_locations() {
   std::string table;
-  const auto moved = plan_.locations.not_by_numbers();
-  for (const auto& [location, place] : moved)
-    table += fmt::format("  {{\"location-{}\", {}u, 0}},\n", location.substr(1), first_bit(place) + 1);
-  print("const unsigned int plchost_location_count = {};\n", moved.size());
-  print("struct plchost_location plchost_locations[] = {{\n{}  {{0}}}};\n", table);
+  const auto places = plan_.locations.places();
+  for (const auto& [location, place] : places)
+    table += fmt::format("  {{\"location-{}\", {}u}},\n", location.substr(1), first_bit(place) + 1);
+  print("const unsigned int plchost_location_count = {};\n", places.size());
+  print("const struct plchost_location plchost_locations[] = {{\n{}  {{0}}}};\n", table);
 }
 
 // In the order of their begins. One that begins before the others have ended shares bits.

@@ -104,12 +104,10 @@ std::expected<Place, std::string> Locations::place(std::string_view location) co
   return found == all_.end() ? place_of(*known, options_.widths) : found->second.place;
 }
 
-std::vector<std::pair<std::string, Place>> Locations::not_by_numbers() const {
+std::vector<std::pair<std::string, Place>> Locations::places() const {
   std::vector<std::pair<std::string, Place>> result;
   for (const auto& [location, located] : all_) {
-    if (!located.place) continue;
-    const auto usual = place_of(location);
-    if (!usual || *usual != *located.place) result.emplace_back(location.text(), *located.place);
+    if (located.place) result.emplace_back(location.text(), *located.place);
   }
   return result;
 }

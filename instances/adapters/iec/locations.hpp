@@ -24,9 +24,8 @@ class Locations {
   /// The error says what is allowed.
   [[nodiscard]] std::expected<Place, std::string> place(std::string_view location) const;
 
-  /// Those whose place is another one than their numbers say in IEC 61131-3: "%QW0.1", and if widths lie
-  /// apart "%QW0".
-  [[nodiscard]] std::vector<std::pair<std::string, Place>> not_by_numbers() const;
+  /// Of all that have one, in the order of their numbers.
+  [[nodiscard]] std::vector<std::pair<std::string, Place>> places() const;
 
   /// Told to the author: places that were chosen, places with locations apart, shared bits.
   [[nodiscard]] SourceProblems remarks() const;

@@ -15,7 +15,7 @@ namespace plchost {
 
 /// Variables that plc_keep_variables() names.
 struct CarriedVariables {
-  void* address = nullptr;  ///< in the application
+  void* address = nullptr;  ///< in the application; null: only their layout is compared
   std::uint32_t bytes = 0;
   std::uint64_t layout = 0;
 };

@@ -162,8 +162,8 @@ RTS_RESULT ApplicationHost::keep_variables(const std::string& name, const Carrie
   if (collected_ == nullptr) return refuse(ERR_NOTINITIALIZED, "they are named in plc_app_init only");
   if (auto valid = check_name("variables", name, PLC_MAX_VARIABLE_NAME); !valid)
     return refuse(ERR_PARAMETER, valid.error().message);
-  if (variables.address == nullptr || variables.bytes == 0)
-    return refuse(ERR_PARAMETER, "pAddress is null or dwBytes is 0");
+  if ((variables.address == nullptr) != (variables.bytes == 0))
+    return refuse(ERR_PARAMETER, "either pAddress is null or dwBytes is 0, not both");
   if (collected_->variables.contains(name)) return refuse(ERR_DUPLICATE, "are named twice");
   const std::uint64_t bytes = collected_->variable_bytes + variables.bytes;
   if (collected_->variables.size() == PLC_MAX_VARIABLES || bytes > PLC_MAX_VARIABLE_BYTES) {

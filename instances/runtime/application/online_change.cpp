@@ -94,7 +94,7 @@ void OnlineChange::connect() {
   }
   for (const auto& [name, carried] : host_.declaration().variables) {
     const auto same = variables.find(name);
-    if (same == variables.end()) continue;
+    if (same == variables.end() || carried.bytes == 0) continue;
     copies_.push_back({.to = same->second.address, .from = carried.address, .bytes = carried.bytes});
     copied_.push_back(name);
   }

@@ -256,6 +256,29 @@ END_RESOURCE END_CONFIGURATION
   ASSERT_TRUE(build(text, "other").success());
   const ControlReply kept = sut->ask(ControlVerb::change_application, so("other"));
   EXPECT_EQ(kept.code, ErrorCode::ok) << kept.text;
+  EXPECT_THAT(kept.text, Not(HasSubstr("location"))) << "nothing of it is carried over";
+}
+
+// Two outputs would change places, and no area its size.
+TEST_P(TextWithATaskFile, IsRefusedOnlineIfALineMovesALocationOfOneNumber) {
+  constexpr const char* kText = R"(
+PROGRAM Main
+  VAR one AT %QW0 : INT; two AT %QW1 : INT; END_VAR
+  one := 1;
+  two := two + 1;
+END_PROGRAM
+CONFIGURATION cell RESOURCE press ON PLC
+  TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+  PROGRAM main_1 WITH fast : Main;
+END_RESOURCE END_CONFIGURATION
+)";
+  ASSERT_TRUE(build(kText, "plain").success());
+  start(so("plain"));
+  (void)sandbox.write("crossed.toml", "[location]\n'%QW0' = '%QW1'\n'%QW1' = '%QW0'\n");
+  ASSERT_TRUE(build(kText, "crossed").success());
+  const ControlReply refused = sut->ask(ControlVerb::change_application, so("crossed"));
+  EXPECT_EQ(refused.code, ErrorCode::refused) << refused.text;
+  EXPECT_THAT(refused.text, HasSubstr("'location-QW0': qwLayout is 17, of the one that runs it is 1"));
 }
 
 }  // namespace

@@ -152,16 +152,22 @@ TEST_F(KilledFirmware, IsNotGoodAgainForTheNextInstance) {
   plc_image_close(&inputs);
 }
 
-// While the program writes in each cycle of 1 ms beside it.
-TEST_F(ModbusChain, ProgramsTakeWhatAClientWritesAndNothingIsLost) {
-  const HeldPort port;
-  start("set_points",
-        "[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Object=line1.m\nLinux.Area.0.Size=16\n");
-  start_modbus(fmt::format(R"(
+/// A program with a memory area, and a client that writes it over Modbus.
+class SetPoints : public ModbusChain {
+ protected:
+  ~SetPoints() override {
+    if (client_ == nullptr) return;
+    modbus_close(client_);
+    modbus_free(client_);
+  }
+  void start_chain() {
+    start("set_points",
+          "[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Object=line1.m\nLinux.Area.0.Size=24\n");
+    start_modbus(fmt::format(R"(
 [[image]]
 name = "line1.m"
 direction = "memory"
-size = 16
+size = 24
 [server]
 listen = "{}"
 [[server.map]]
@@ -190,40 +196,92 @@ image = "line1.m"
 offset = 12
 order = "abcd"
 writable = true
+[[server.map]]
+kind = "holding_register"
+address = 8
+count = 4
+image = "line1.m"
+offset = 16
+writable = true
 )",
-                           port.address()));
-  modbus_t* const client = modbus_new_tcp("127.0.0.1", port.number());
-  modbus_set_response_timeout(client, 10, 0);
-  ASSERT_TRUE(eventually([&] { return modbus_connect(client) == 0; })) << modbus->log();
-  const auto holding = [&](int address) {
+                             port_.address()));
+    client_ = modbus_new_tcp("127.0.0.1", port_.number());
+    modbus_set_response_timeout(client_, 10, 0);
+    ASSERT_TRUE(eventually([&] { return modbus_connect(client_) == 0; })) << modbus->log();
+  }
+  [[nodiscard]] int holding(int address) const {
     std::uint16_t value = 0;
-    return modbus_read_registers(client, address, 1, &value) == 1 ? int{value} : -1;
-  };
-  const auto coil = [&](int address) {
+    return modbus_read_registers(client_, address, 1, &value) == 1 ? int{value} : -1;
+  }
+  [[nodiscard]] int coil(int address) const {
     std::uint8_t value = 0;
-    return modbus_read_bits(client, address, 1, &value) == 1 ? int{value} : -1;
-  };
+    return modbus_read_bits(client_, address, 1, &value) == 1 ? int{value} : -1;
+  }
+  [[nodiscard]] bool write(int address, std::uint16_t value) const {
+    return modbus_write_register(client_, address, value) == 1;
+  }
+  [[nodiscard]] bool write_coil(int address, bool on) const {
+    return modbus_write_bit(client_, address, on) == 1;
+  }
+  [[nodiscard]] bool write_wide(std::uint16_t both) const {
+    const std::array<std::uint16_t, 2> wide = {both, both};
+    return modbus_write_registers(client_, 6, 2, wide.data()) == 2;
+  }
+
+ private:
+  const HeldPort port_;
+  modbus_t* client_ = nullptr;
+};
+
+// While the program writes in each cycle of 1 ms beside it.
+TEST_F(SetPoints, OfAClientAreTakenAndNothingIsLost) {
+  ASSERT_NO_FATAL_FAILURE(start_chain());
   const int before = holding(1);
   for (std::uint16_t value = 1; value <= 500; ++value) {
-    const std::array<std::uint16_t, 2> wide = {value, value};
-    ASSERT_EQ(modbus_write_register(client, 0, value), 1);
-    ASSERT_EQ(modbus_write_registers(client, 6, 2, wide.data()), 2);
-    ASSERT_EQ(modbus_write_bit(client, 1, value % 2), 1);
+    ASSERT_TRUE(write(0, value));
+    ASSERT_TRUE(write_wide(value));
+    ASSERT_TRUE(write_coil(1, value % 2 != 0));
     ASSERT_EQ(holding(0), value);
   }
   EXPECT_TRUE(eventually([&] { return holding(2) == 500 && coil(2) == 0; }))
       << "as the program has seen them";
-  EXPECT_EQ(modbus_write_bit(client, 1, 1), 1);
+  EXPECT_TRUE(write_coil(1, true));
   EXPECT_TRUE(eventually([&] { return coil(2) == 1; }));
   EXPECT_NE(holding(1), before) << "the program runs";
   EXPECT_EQ(holding(3), 0) << "lost writes of the program";
   EXPECT_EQ(holding(5), 0) << "halves of values of 32 bit";
-  EXPECT_EQ(modbus_write_register(client, 5, 1), -1) << "that map is only shown";
+  EXPECT_FALSE(write(5, 1)) << "that map is only shown";
   // A value that the program changes in each cycle is the program's soon.
-  EXPECT_EQ(modbus_write_register(client, 2, 7), 1);
+  EXPECT_TRUE(write(2, 7));
   EXPECT_TRUE(eventually([&] { return holding(2) == 500; }));
-  modbus_close(client);
-  modbus_free(client);
+}
+
+// A task that uses the place, too, comes between the assignment and the end of that cycle.
+TEST_F(SetPoints, OfAClientDoNotUndoWhatATaskHasAssignedInItsCycle) {
+  ASSERT_NO_FATAL_FAILURE(start_chain());
+  for (std::uint16_t value = 30000; value < 30500; ++value) ASSERT_TRUE(write(8, value));
+  const int after = holding(8);
+  EXPECT_TRUE(eventually([&] { return holding(8) != after && holding(8) < 30000; }))
+      << "the slow task assigns";
+  EXPECT_EQ(holding(9), 0) << "assignments that were gone";
+}
+
+// Of a task that has not run since: the new version takes it, although it is the initial value.
+TEST_F(SetPoints, OfAClientAreThereAfterAnOnlineChange) {
+  ASSERT_NO_FATAL_FAILURE(start_chain());
+  for (int round = 0; round < 3; ++round) {
+    ASSERT_TRUE(write(10, 7));
+    ASSERT_TRUE(eventually([&] { return holding(11) == 7; }));
+    ASSERT_TRUE(write(10, 0));
+    const ControlReply changed = instance->ask(ControlVerb::change_application, application("set_points_2"));
+    ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text;
+    EXPECT_TRUE(eventually([&] { return holding(11) == 0; })) << "round " << round;
+    EXPECT_EQ(holding(10), 0);
+    if (round < 2) {
+      ASSERT_EQ(instance->ask(ControlVerb::change_application, application("set_points")).code,
+                ErrorCode::ok);
+    }
+  }
 }
 
 }  // namespace

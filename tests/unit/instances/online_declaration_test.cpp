@@ -39,7 +39,7 @@ TEST_F(CarriedVariablesOf, AnApplicationAreNamedInItsInit) {
   EXPECT_EQ(kept.layout, 3U);
 }
 
-TEST_F(CarriedVariablesOf, NoNameOrNoBytesAreRefused) {
+TEST_F(CarriedVariablesOf, NoNameOrHalfOfAPlaceAreRefused) {
   EXPECT_EQ(plc_keep_variables(nullptr, bytes_.data(), 8, 0), ERR_PARAMETER);
   EXPECT_EQ(plc_keep_variables("", bytes_.data(), 8, 0), ERR_PARAMETER);
   EXPECT_EQ(plc_keep_variables("a b", bytes_.data(), 8, 0), ERR_PARAMETER);
@@ -48,6 +48,11 @@ TEST_F(CarriedVariablesOf, NoNameOrNoBytesAreRefused) {
   EXPECT_EQ(plc_keep_variables("a", nullptr, 8, 0), ERR_PARAMETER);
   EXPECT_EQ(plc_keep_variables("a", bytes_.data(), 0, 0), ERR_PARAMETER);
   EXPECT_EQ(plc_keep_variables(std::string(PLC_MAX_VARIABLE_NAME, 'x').c_str(), bytes_.data(), 8, 0), ERR_OK);
+}
+
+TEST_F(CarriedVariablesOf, NothingAreComparedOnly) {
+  EXPECT_EQ(plc_keep_variables("place", nullptr, 0, 17), ERR_OK);
+  EXPECT_EQ(declaration_.variables.begin()->second.layout, 17U);
 }
 
 TEST_F(CarriedVariablesOf, AnApplicationHaveABound) {

@@ -109,7 +109,7 @@ constexpr std::array kImageKeys = {
         "[[image]]",
         {.name = "direction",
          .meaning = "seen from the PLC: this process alone writes an input image, an instance an output "
-                    "image. `memory`: another area, which the server shows"}),
+                    "image. `memory`: another area, which the server shows, and its clients may write"}),
     key<&ImageConfig::size, RequiredKey<NumberKey<1, PLC_IMAGE_MAX_SIZE>>>(
         "[[image]]", {.name = "size", .meaning = "bytes (`[SysMem] Area.0.Size`)"}),
 };

@@ -22,7 +22,7 @@ const struct plchost_place plchost_places[] = {
     {"__QB8", 'Q', 1, -1, 0, 8, &posts}};
 unsigned long long plchost_exchanged[11];
 const unsigned int plchost_location_count = 0;
-struct plchost_location plchost_locations[] = {{0, 0, 0}};
+const struct plchost_location plchost_locations[] = {{0, 0}};
 
 static struct plchost_use of_fast[] = {{0, &go, 0, 0},   {1, &raw, 0, 0},   {2, &lamp, 0, 0},
                                        {3, &byte, 0, 0}, {4, &twice, 0, 0}, {6, &copy, 0, 0},
