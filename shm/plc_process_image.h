@@ -26,7 +26,6 @@
  * and its own safe state beyond it: plc_image_silence_ns(&outputs).
  *
  * Firmware can be killed, too. plc_image_write_watched() leaves the inputs that programs see then.
- *
  * If the file is removed, the next start or plc_image_open makes it anew: see plc_image_gone().
  */
 #ifndef PLC_PROCESS_IMAGE_H
@@ -324,8 +323,7 @@ static __inline__ void plc_image_tell(const plc_image* image, unsigned int state
   } while (!plc_image_tell_since(image, told, state, safe || (told & PLC_IMAGE_SHOWS_SAFE) != 0));
 }
 
-/* After plc_image_write: the images that are published are shown again, unless something else was told since
- * `told`. Real-time. */
+/* After plc_image_write: shows what is published, unless another word was told since `told`. Real-time. */
 static __inline__ void plc_image_resume(const plc_image* image, plc_image_u64 told) {
   (void)plc_image_tell_since(image, told, PLC_IMAGE_STATE_RUNNING, 0);
 }
@@ -340,10 +338,12 @@ static __inline__ void plc_image_beat(const plc_image* image) {
 static __inline__ void plc_image_write_watched(const plc_image* image, const void* bytes,
                                                const void* at_end) {
   plc_image_set_safe(image, at_end);
-  plc_image_write(image, bytes);
   plc_image_beat(image);
-  __atomic_store_n(&image->header->on_end, 2u, __ATOMIC_RELAXED);
-  plc_image_resume(image, plc_image_control(image)); /* it ends a look of a reader, too */
+  __atomic_store_n(&image->header->on_end, 2u, __ATOMIC_RELEASE); /* also if the first call is cut off here */
+  plc_image_write(image, bytes);
+  do /* a reader that has looked before the beat may tell the silence once more */
+    plc_image_resume(image, plc_image_control(image));
+  while (plc_image_state(image) == PLC_IMAGE_STATE_SILENT);
 }
 
 /* Begins to write, as process number `writer`: before anything is told. Set-up. */

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "instances/runtime/memory/silence.hpp"
 #include "shm/plc_process_image.h"
 #include "tests/models/checker/model.hpp"
 
@@ -33,6 +34,15 @@ struct Shared {
   void set_safe(plc_image_u64 value) {
     const Image image_of_value{value, value};
     plc_image_set_safe(&image, image_of_value.data());
+  }
+  void write_watched(plc_image_u64 value) {
+    const Image image_of_value{value, value};
+    const Image at_end{kSafe, kSafe};
+    plc_image_write_watched(&image, image_of_value.data(), at_end.data());
+  }
+  void be_silent() {
+    plc_image_i64& sign = image.header->heartbeat_ns;
+    if (__atomic_load_n(&sign, __ATOMIC_RELAXED) != 0) __atomic_store_n(&sign, 1, __ATOMIC_RELAXED);
   }
   // The word that was told.
   plc_image_u64 stop() {
@@ -190,6 +200,33 @@ void the_next_writer_comes_first(Scene& scene) {
   });
 }
 
+// An instance tells the silence of firmware that comes back just then.
+void late_firmware_is_shown_again(Scene& scene) {
+  Shared& shared = make(scene);
+  shared.write_watched(1);
+  shared.be_silent();
+  scene.thread("firmware", [&] {
+    shared.write_watched(2);
+    require(shared.read() == 2, "the image of the end, although there is a new one");
+  });
+  scene.thread("instance", [&] { tell_silence(shared.image); });
+}
+
+void firmware_is_killed_in_its_first_call(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.limits({.kills = 1});
+  const ThreadNumber victim =
+      scene.thread("firmware", [&] { shared.write_watched(1); }, {.may_be_killed = true});
+  scene.thread("instance",
+               [&shared, victim] {
+                 shared.be_silent();
+                 tell_silence(shared.image);
+                 const plc_image_u64 seen = shared.read();
+                 require(seen == kSafe || (seen == 0 && was_killed(victim)), "an image without an end");
+               },
+               {.after = static_cast<int>(victim)});
+}
+
 }  // namespace
 }  // namespace plchost::models
 
@@ -203,5 +240,7 @@ int main(int argc, char** argv) {
               {"a_first_cycle", a_first_cycle},
               {"a_safe_image_is_told", a_safe_image_is_told},
               {"a_writer_is_killed_while_it_stops", a_writer_is_killed_while_it_stops},
-              {"the_next_writer_comes_first", the_next_writer_comes_first}});
+              {"the_next_writer_comes_first", the_next_writer_comes_first},
+              {"late_firmware_is_shown_again", late_firmware_is_shown_again},
+              {"firmware_is_killed_in_its_first_call", firmware_is_killed_in_its_first_call}});
 }

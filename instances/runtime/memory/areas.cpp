@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/runtime/memory/silence.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {

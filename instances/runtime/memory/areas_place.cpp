@@ -9,6 +9,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/memory/areas.hpp"
+#include "instances/runtime/memory/silence.hpp"
 
 namespace plchost {
 

@@ -14,16 +14,6 @@ std::span<std::byte> part(std::span<std::byte> all, ByteRange range) noexcept {
 
 }  // namespace
 
-// The word comes first: an image that is written meanwhile changes it, and nothing is told.
-void tell_silence(const plc_image& image) noexcept {
-  const plc_image_u64 told = plc_image_control(&image);
-  const bool watched = (told & PLC_IMAGE_STATE) == PLC_IMAGE_STATE_RUNNING &&
-                       __atomic_load_n(&image.header->on_end, __ATOMIC_RELAXED) == 2;
-  const plc_image_i64 sign_ns = plc_image_heartbeat_age_ns(&image);
-  if (watched && sign_ns != PLC_IMAGE_NEVER && sign_ns > PLC_IMAGE_PATIENCE_NS)
-    (void)plc_image_tell_since(&image, told, PLC_IMAGE_STATE_SILENT, 1);
-}
-
 InputView::InputView(std::vector<std::byte> initial, const plc_image* source)
     : bytes_(std::move(initial)), scratch_(bytes_.size()), image_(source) {}
 

@@ -14,10 +14,6 @@ namespace plchost {
 /// The counter of a task's cycles: odd inside of one, even outside. In retain memory.
 using CycleCounter = std::atomic<std::uint64_t>;
 
-/// Of an image that its writer fills by plc_image_write_watched(). If the last sign is too old, readers are
-/// shown the image that it has left for that, until its next one. Any context.
-void tell_silence(const plc_image& image) noexcept;
-
 /// One task's copy of a block of inputs. Real-time but for its making.
 class InputView {
  public:

@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 
 #include "instances/runtime/memory/output_image.hpp"
+#include "instances/runtime/memory/silence.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
