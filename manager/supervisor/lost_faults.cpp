@@ -14,7 +14,7 @@ namespace plchost {
 
 namespace {
 
-// In the order in which they were found.
+// The newest ones, in the order in which they were found.
 std::vector<ExceptionEntry> faults_of(const InstancePageReader& page,
                                       const Result<FlightPageReader>& recorder) {
   std::vector<ExceptionEntry> found;
@@ -29,10 +29,17 @@ std::vector<ExceptionEntry> faults_of(const InstancePageReader& page,
     entry.circumstances.cycles = task->counters.cycles;
     entry.circumstances.settings = task_settings(identity.kind, Duration(identity.interval_ns),
                                                  identity.iec_priority, runtime ? runtime->core : -1);
-    if (recorder) entry.activity = activity_before(*recorder, time_of(*fault));
     if (runtime) entry.circumstances.scheduler = runtime->scheduler.view();
   }
   std::ranges::sort(found, {}, &ExceptionEntry::unix_ns);
+  const std::size_t most = ExceptionHistory::kMaxEntries;
+  if (found.size() > most) found.erase(found.begin(), found.end() - most);
+  // Of these only: each reads all rings.
+  for (ExceptionEntry& entry : found) {
+    FaultRecord record;
+    record.unix_ns = entry.unix_ns;
+    if (recorder) entry.activity = activity_before(*recorder, time_of(record));
+  }
   return found;
 }
 

@@ -94,7 +94,8 @@ std::string_view to_string(FaultKind kind) noexcept {
 }
 
 TimePoint time_of(const FaultRecord& record) noexcept {
-  return MonotonicClock::now() - Duration(std::max<std::int64_t>(unix_time_ns() - record.unix_ns, 0));
+  const std::int64_t now = std::max<std::int64_t>(unix_time_ns(), 0);  // first: dated late rather than early
+  return MonotonicClock::now() - Duration(now - std::clamp<std::int64_t>(record.unix_ns, 0, now));
 }
 
 std::string describe_end(const BackTrace& trace) {

@@ -1,6 +1,7 @@
 #include "shm/pages/exception_history.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -9,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "shm/base/fault_record.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -371,6 +373,17 @@ TEST_F(ExceptionHistoryTest, RefusesAFileOfManyLevels) {
   const auto history = read_exceptions(path_);
   ASSERT_FALSE(history);
   EXPECT_EQ(history.error().code, ErrorCode::corrupt);
+}
+
+// Its time lies in shared memory.
+TEST(TimeOfAFault, IsNoneToComeWhateverAStrangerHasWritten) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  for (const std::int64_t unix_ns : {Limits::min(), std::int64_t{-1}, Limits::max()}) {
+    FaultRecord record;
+    record.unix_ns = unix_ns;
+    const TimePoint at = time_of(record);
+    EXPECT_LE(at, MonotonicClock::now()) << unix_ns;
+  }
 }
 
 }  // namespace
