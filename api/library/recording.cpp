@@ -54,6 +54,7 @@ class Recorded {
   }
   /// False: the client ends before, or its caller has enough.
   [[nodiscard]] bool sleep_until(TimePoint end) {
+    if (has_enough_) return false;
     return answer_of<bool>(
                [end](ClientCore& core, const Answer<bool>& answer) { return sleep(core, answer, end); })
         .has_value();

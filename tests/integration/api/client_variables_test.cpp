@@ -323,6 +323,23 @@ TEST_F(ClientVariables, AreRecordedUntilTheSinkHasEnoughOrItsCallerDoes) {
   EXPECT_THROW((void)sut_.record_variables("hosta", "line1", {"fast.*"}, {}, throws), std::out_of_range);
 }
 
+// It is asked once while the instance stands still, and that one says it.
+TEST_F(ClientVariables, ARecordingEndsByOneNoWhileASampleIsAwaited) {
+  int samples = 0;
+  int asked = 0;
+  const auto stops_at_the_third = [&](const std::string& /*lines*/) {
+    if (++samples == 3) process_.signal(SIGSTOP);
+    return true;
+  };
+  const auto goes_on = [&] {
+    if (samples < 3 || ++asked != 2) return true;
+    process_.signal(SIGCONT);
+    return false;
+  };
+  const Client::RecordOptions hundred{milliseconds(10), milliseconds(0), 100, goes_on};
+  EXPECT_EQ(sut_.record_variables("hosta", "line1", {"fast.*"}, hundred, stops_at_the_third), 3U);
+}
+
 TEST_F(ClientVariables, ARecordingIsRefusedAndLeavesAnEarlierOne) {
   const std::string file = host_.run_directory() + "/record.csv";
   std::ofstream(file) << "an earlier one";
