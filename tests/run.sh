@@ -86,7 +86,7 @@ run() {
   processor_seconds
   end_step "$what" "$code" $((SECONDS - began)) $((used - before)) "$log"
 }
-# The gates use one core, and tests wait most of the time. Steps that depend on neither run beside them, one after the other.
+# Gates use one core, and tests wait most of the time. Steps that depend on neither run beside them, one after the other.
 # run_ahead STEP...: functions of this script, later join STEP WHAT
 run_ahead() {
   set -m  # as a process group, which can be ended as one
@@ -231,9 +231,9 @@ case "${1:-}" in
   "")
     run "packages" .ci/packages test
     tests/left_behind.py begin "$own/before"
-    run_ahead gates build_asan build_tsan tidy alone build_fuzzers
+    run_ahead build_asan build_tsan tidy alone build_fuzzers
     run "build" build_plain
-    join gates "gates, each proven by a planted fault"  # before the tests: one gate looks for what is left behind
+    run "gates, each proven by a planted fault" gates  # before the tests: one gate looks for what is left behind
     run "tests" tests "$build" "${whole[@]}"
     count
     join build_asan "address and undefined sanitizers: build"
