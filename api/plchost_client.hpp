@@ -85,6 +85,8 @@ struct LoadOptions {
       false;  ///< it takes over while the tasks run: no cycle is lost; refused where it does not fit
 };
 
+/// A client of all hosts of one domain: one participant of DDS, and the threads of its own. All functions may
+/// be called from any thread, and wait as long as their documentation says. Errors are ClientError.
 class PLCHOST_CLIENT_API Client {
  public:
   struct Options {

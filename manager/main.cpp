@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "api/security/identity.hpp"
+#include "instances/launch/option_names.hpp"
 #include "manager/config/config_changes.hpp"
 #include "manager/config/load_config.hpp"
 #include "manager/fix_host.hpp"
@@ -84,15 +85,6 @@ void describe(CLI::App& app, Options& options) {
       "A changed key of the configuration, after 'systemctl reload', SIGHUP or 'plcctl reload host':\n";
   for (const std::string& row : key_table()) footer += fmt::format("  {}\n", row);
   app.footer(footer);
-}
-
-std::vector<std::string> option_names(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  return names;
 }
 
 Result<void> check_identity(const ManagerConfig& config) {

@@ -93,6 +93,7 @@ struct RestartHistory {
   bool operator==(const RestartHistory&) const = default;
 };
 
+/// The manager's answer to the end of a process.
 struct Decision {
   enum class Action : std::uint8_t {
     leave,           ///< nothing: process and application stay as they are

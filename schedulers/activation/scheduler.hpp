@@ -20,6 +20,7 @@ struct SchedulerContext {
   std::uint32_t tick_frequency = 0;  ///< of the clock device that ticks, Hz; 0: the ticks come from `clock`
 };
 
+/// The features of a policy that its tasks may need.
 struct SchedulerCapabilities {
   bool ticks = false;     ///< on_tick() releases its tasks, so the ticks lie on their grid
   bool one_shot = false;  ///< releases may be moved each cycle (distributed clocks)

@@ -8,6 +8,7 @@
 
 namespace plchost {
 
+/// The entry of the registry for one policy: in that policy's own file, which alone knows its class. Set-up.
 template <class Policy>
 SchedulerEntry make_policy_entry(std::string_view name) {
   return {.name = name,

@@ -35,6 +35,7 @@ enum class ApiRole : std::uint8_t { viewing, operating, engineering };
 /// A right that a key of [host] gives to a role. The topic's role alone does not suffice then.
 enum class OperationRight : std::uint8_t { none, read_variables, write_variables };
 
+/// The kind of the one argument that a row of the table of operations may have.
 enum class OperationArgument : std::uint8_t {
   none,
   path,             ///< of an application, absolute, on the host

@@ -36,6 +36,7 @@ enum class RestartPolicy : std::uint32_t {
 /// As configurations and users write them.
 inline constexpr std::array<std::string_view, 3> kRestartPolicyNames = {"never", "on-failure", "always"};
 
+/// The manager's own part of its page.
 struct HostStatus {
   FixedText<kMaxHostName> name;
   FixedText<31> version;
@@ -65,6 +66,7 @@ struct InstancePlan {
   FixedText<kMaxAfter> after;       ///< names of the instances that it waits for, with commas between
 };
 
+/// An instance as its manager sees it.
 struct InstanceStatus {
   FixedText<kMaxInstanceName> name;
   FixedText<kMaxSchedulerName> scheduler;

@@ -22,6 +22,7 @@ class PoolAdoption;
 inline constexpr std::uint32_t kMinObjects = 16;
 inline constexpr std::uint32_t kMaxObjects = 1'000'000;
 
+/// Of a pool that is made. One that is there already keeps its own.
 struct PoolOptions {
   /// kMinObjects to kMaxObjects. The number that the pool was made with counts.
   std::uint32_t max_objects = 4096;

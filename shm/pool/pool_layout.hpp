@@ -154,10 +154,11 @@ struct alignas(64) PoolHeader {
   std::atomic<std::uint32_t> client_high_water;
   std::atomic<std::uint32_t> departed;  ///< clients that ended without releasing what they held
   Link unsettled;  ///< the object that is being made or taken away, with its file if it is a memory
-  std::atomic<std::uint32_t> rebuilding;      ///< 1: the lists are being made anew
-  std::atomic<std::uint32_t> rebuilds;        ///< how often they were, because a stranger had damaged them
-  std::atomic<std::uint32_t> lost_objects;    ///< objects that were not valid then
-  std::atomic<std::uint32_t> header_mended;   ///< how often what write_constants() writes was written anew
+  std::atomic<std::uint32_t> rebuilding;    ///< 1: the lists are being made anew
+  std::atomic<std::uint32_t> rebuilds;      ///< how often they were, because a stranger had damaged them
+  std::atomic<std::uint32_t> lost_objects;  ///< objects that were not valid then
+  std::atomic<std::uint32_t>
+      header_mended;  ///< how often what write_pool_constants() writes was written anew
   std::atomic<std::uint32_t> client_numbers;  ///< across: the next one; see ClientLocks. Not guarded
   std::array<std::uint32_t, 2> reserved3;
 

@@ -19,6 +19,7 @@ inline constexpr int kControlVersion = 2;
 inline constexpr std::string_view kBootOption = "boot";
 inline constexpr std::string_view kYes = "yes";
 
+/// A request over a control socket: from a client by plchost-dds to the manager, or from that to an instance.
 struct ControlRequest {
   std::uint64_t number = 0;  ///< chosen by the sender, comes back in the reply
   ControlVerb verb = ControlVerb::status;
@@ -35,6 +36,7 @@ struct ControlRequest {
 /// timed_out: that limit of a request is over, so it must not be begun.
 [[nodiscard]] Result<void> check_in_time(std::int64_t limit_ns, std::int64_t now_ns = boot_time_ns());
 
+/// The answer to the request of that number.
 struct ControlReply {
   std::uint64_t number = 0;
   ErrorCode code = ErrorCode::ok;

@@ -141,15 +141,37 @@ static void take_memory(unsigned int number, const unsigned char* area) {
     exchange(number, last, now);
 }
 
-/* For each place of the memory: tasks that are in a cycle and use it. */
-static unsigned int* users_now = NULL;
+static unsigned char* in_cycle = NULL; /* of each task */
+static unsigned char* left = NULL;     /* for each place: cycles whose tasks have left it to another one */
+#define MOST_LEFT 200                  /* that one may have been stopped in its cycle, by a fault */
+
+static int others_use(const struct plchost_task* task, unsigned int place) {
+  unsigned int i;
+  unsigned int j;
+  for (i = 0; i < plchost_task_count; ++i) {
+    const struct plchost_task* const other = &plchost_tasks[i];
+    if (other == task || !__atomic_load_n(&in_cycle[i], __ATOMIC_SEQ_CST)) continue;
+    for (j = 0; j < other->uses_count; ++j) {
+      if (other->uses[j].place == place) return 1;
+    }
+  }
+  return 0;
+}
+
+/* A value that this task has not changed is that of another one, which may be in the midst of its cycle, or
+ * of an operator. */
+static int leaves(const struct plchost_task* task, unsigned int place) {
+  if (!others_use(task, place)) return 0;
+  return __atomic_add_fetch(&left[place], 1, __ATOMIC_RELAXED) <= MOST_LEFT;
+}
 
 /* First into the area: a task that comes between the two takes what is there already. */
-static void put_memory(const struct plchost_use* use, unsigned char* area, int others) {
+static void put_memory(const struct plchost_task* task, const struct plchost_use* use, unsigned char* area) {
   const struct plchost_place* const place = &plchost_places[use->place];
   const unsigned long long last = __atomic_load_n(&plchost_exchanged[use->place], __ATOMIC_SEQ_CST);
   const unsigned long long value = value_of(place, place->value);
-  if (value == last || (value == use->before && others)) return;
+  if (value == last || (value == use->before && leaves(task, use->place))) return;
+  __atomic_store_n(&left[use->place], 0, __ATOMIC_RELAXED);
   store(place, area, value);
   exchange(use->place, last, value);
 }
@@ -187,13 +209,13 @@ void plchost_take_places(const struct plchost_task* task) {
     find_exchanged();
     __atomic_store_n(&is_known, 1, __ATOMIC_SEQ_CST);
   }
+  __atomic_store_n(&in_cycle[task - plchost_tasks], 1, __ATOMIC_SEQ_CST);
   find_areas(found);
   for (i = 0; i < task->uses_count; ++i) {
     struct plchost_use* const use = &task->uses[i];
     const struct plchost_place* const place = &plchost_places[use->place];
     const unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
-      __atomic_add_fetch(&users_now[use->place], 1, __ATOMIC_SEQ_CST);
       take_memory(use->place, area);
       use->before = value_of(place, place->value);
     } else if (place->area == 'I' || place->aliased) {
@@ -206,13 +228,14 @@ void plchost_take_places(const struct plchost_task* task) {
 void plchost_put_places(const struct plchost_task* task) {
   unsigned char* found[AREAS];
   unsigned int i;
+  __atomic_store_n(&in_cycle[task - plchost_tasks], 0, __ATOMIC_SEQ_CST);
   find_areas(found);
   for (i = 0; i < task->uses_count; ++i) {
     const struct plchost_use* const use = &task->uses[i];
     const struct plchost_place* const place = &plchost_places[use->place];
     unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
-      put_memory(use, area, __atomic_sub_fetch(&users_now[use->place], 1, __ATOMIC_SEQ_CST) != 0);
+      put_memory(task, use, area);
     } else if (place->area == 'Q') {
       put_output(use, area);
     }
@@ -232,7 +255,7 @@ void plchost_exchange_places(const struct plchost_task* task) {
       if (!place->aliased || place->area == 'I') continue;
       if (place->area == 'M') {
         if (step == 0) {
-          put_memory(use, area, 1);
+          put_memory(task, use, area);
         } else {
           take_memory(use->place, area);
           use->before = value_of(place, place->value);
@@ -291,11 +314,13 @@ static int allocate_areas(void) {
     if (end > area->bytes) area->bytes = end;
   }
   for (i = 0; i < AREAS; ++i) bytes += areas[i].bytes;
+  in_cycle = calloc(plchost_task_count + 1u, 1);
+  left = calloc(plchost_place_count + 1u, 1);
+  if (in_cycle == NULL || left == NULL) return 0;
   if (bytes == 0) return 1;
   initial_bytes = calloc(bytes, 1);
   area_users = calloc(AREAS * plchost_task_count, sizeof *area_users);
-  users_now = calloc(plchost_place_count, sizeof *users_now);
-  if (initial_bytes == NULL || area_users == NULL || users_now == NULL) return 0;
+  if (initial_bytes == NULL || area_users == NULL) return 0;
   bytes = 0;
   for (i = 0; i < AREAS; ++i) {
     areas[i].initial = initial_bytes + bytes;
@@ -348,5 +373,6 @@ int plchost_declare_places(void) {
 void plchost_forget_places(void) {
   free(initial_bytes);
   free(area_users);
-  free(users_now);
+  free(in_cycle);
+  free(left);
 }

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "instances/launch/option_names.hpp"
 #include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log_levels.hpp"
@@ -53,15 +54,6 @@ std::string check_log_level(const std::string& name) {
 // An empty one, of a variable of the shell that is not set, would start an instance.
 std::string check_path(const std::string& path) {
   return path.empty() ? "the name of the file is empty" : "";
-}
-
-std::vector<std::string> option_names(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
-  return names;
 }
 
 void describe(CLI::App& app, Options& options) {
