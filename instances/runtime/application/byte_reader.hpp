@@ -41,7 +41,7 @@ class ByteReader {
   /// As far as a zero, which is skipped.
   std::string_view text() noexcept {
     const auto* const begin = reinterpret_cast<const char*>(left_.data());
-    const std::size_t length = ::strnlen(begin, left_.size());
+    const std::size_t length = left_.empty() ? 0 : ::strnlen(begin, left_.size());  // not of null
     if (length == left_.size()) {
       fail();
       return {};
