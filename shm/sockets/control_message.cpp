@@ -88,7 +88,7 @@ Result<void> check_in_time(std::int64_t limit_ns, std::int64_t now_ns) {
   constexpr double kNsPerMs = 1e6;
   return failure(ErrorCode::timed_out,
                  fmt::format("not done: it came {:.1f} ms after the time limit of the client",
-                             static_cast<double>(now_ns - limit_ns) / kNsPerMs));
+                             (static_cast<double>(now_ns) - static_cast<double>(limit_ns)) / kNsPerMs));
 }
 
 std::string encode(const ControlRequest& request) {

@@ -119,5 +119,11 @@ TEST(ControlMessage, NamesTheVersionThatIsSpoken) {
   EXPECT_THAT(decoded.error().message, HasSubstr("version 9; expected is version 2"));
 }
 
+TEST(TimeLimit, OfAnyNumberIsOverOrNot) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  EXPECT_FALSE(check_in_time(Limits::min(), Limits::max()));
+  EXPECT_TRUE(check_in_time(Limits::max(), Limits::min()));
+}
+
 }  // namespace
 }  // namespace plchost
