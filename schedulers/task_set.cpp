@@ -193,7 +193,7 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
     const FaultRecord* const record = tasks_[i]->fault().published();
     if (record == nullptr || fault_taken_[i]) continue;
     fault_taken_[i] = true;
-    const TimePoint time = time_of(*record);
+    const TimePoint time = time_of_fault(record->unix_ns);
     environment_.control_flight.put(time, FlightKind::fault,
                                     fault_figure(i, std::to_underlying(record->kind)));
     return Fault{.task = i,

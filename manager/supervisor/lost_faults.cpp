@@ -36,9 +36,7 @@ std::vector<ExceptionEntry> faults_of(const InstancePageReader& page,
   if (found.size() > most) found.erase(found.begin(), found.end() - most);
   // Of these only: each reads all rings.
   for (ExceptionEntry& entry : found) {
-    FaultRecord record;
-    record.unix_ns = entry.unix_ns;
-    if (recorder) entry.activity = activity_before(*recorder, time_of(record));
+    if (recorder) entry.activity = activity_before(*recorder, time_of_fault(entry.unix_ns));
   }
   return found;
 }

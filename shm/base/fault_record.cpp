@@ -93,9 +93,9 @@ std::string_view to_string(FaultKind kind) noexcept {
   return "unknown";
 }
 
-TimePoint time_of(const FaultRecord& record) noexcept {
+TimePoint time_of_fault(std::int64_t unix_ns) noexcept {
   const std::int64_t now = std::max<std::int64_t>(unix_time_ns(), 0);  // first: dated late rather than early
-  return MonotonicClock::now() - Duration(now - std::clamp<std::int64_t>(record.unix_ns, 0, now));
+  return MonotonicClock::now() - Duration(now - std::clamp<std::int64_t>(unix_ns, 0, now));
 }
 
 std::string describe_end(const BackTrace& trace) {

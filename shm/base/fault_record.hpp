@@ -74,8 +74,9 @@ struct FaultRecord {
   FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
 };
 
-/// When it was found, by the clock of the tasks, unless CLOCK_REALTIME was set since. Any context.
-[[nodiscard]] TimePoint time_of(const FaultRecord& record) noexcept;
+/// When a fault of this CLOCK_REALTIME was found, by the clock of the tasks, unless the former was set since.
+/// Any number is allowed, as it may lie in shared memory. Any context.
+[[nodiscard]] TimePoint time_of_fault(std::int64_t unix_ns) noexcept;
 /// In words: the cause, with its figures. Without addresses, which only the process can name.
 [[nodiscard]] std::string describe_fault(const FaultRecord& record);
 /// "SIGSEGV"; "signal 40" if it has no name here.

@@ -131,14 +131,15 @@ static void exchange(unsigned int number, unsigned long long last, unsigned long
 }
 
 /* A value that is none of before is one that a task has assigned and not put yet. */
-static void take_memory(unsigned int number, const unsigned char* area) {
-  const struct plchost_place* const place = &plchost_places[number];
-  const unsigned long long last = __atomic_load_n(&plchost_exchanged[number], __ATOMIC_SEQ_CST);
+static void take_memory(struct plchost_use* use, const unsigned char* area) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  const unsigned long long last = __atomic_load_n(&plchost_exchanged[use->place], __ATOMIC_SEQ_CST);
   const unsigned long long before = value_at(place->value, place->bytes);
   const unsigned long long now = load(place, area);
   if (now != last && value_of(place, &before) == last &&
       set_value_if(place->value, place->bytes, before, now))
-    exchange(number, last, now);
+    exchange(use->place, last, now);
+  use->before = value_of(place, place->value);
 }
 
 static unsigned char* in_cycle = NULL; /* of each task */
@@ -216,8 +217,7 @@ void plchost_take_places(const struct plchost_task* task) {
     const struct plchost_place* const place = &plchost_places[use->place];
     const unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
-      take_memory(use->place, area);
-      use->before = value_of(place, place->value);
+      take_memory(use, area);
     } else if (place->area == 'I' || place->aliased) {
       use->before = load(place, area);
       set_value(use->value, place->bytes, use->before);
@@ -254,12 +254,10 @@ void plchost_exchange_places(const struct plchost_task* task) {
       unsigned char* const area = found[area_of(place) - areas];
       if (!place->aliased || place->area == 'I') continue;
       if (place->area == 'M') {
-        if (step == 0) {
+        if (step == 0)
           put_memory(task, use, area);
-        } else {
-          take_memory(use->place, area);
-          use->before = value_of(place, place->value);
-        }
+        else
+          take_memory(use, area);
       } else if (step == 0) {
         put_output(use, area);
       } else {

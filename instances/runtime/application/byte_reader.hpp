@@ -7,6 +7,8 @@
 #include <span>
 #include <string_view>
 
+#include "instances/runtime/application/elf_bytes.hpp"
+
 namespace plchost {
 
 /// Reads numbers and texts from bytes that nobody vouches for, in this processor's order. Beyond the end all
@@ -40,14 +42,13 @@ class ByteReader {
   }
   /// As far as a zero, which is skipped.
   std::string_view text() noexcept {
-    const auto* const begin = reinterpret_cast<const char*>(left_.data());
-    const std::size_t length = left_.empty() ? 0 : ::strnlen(begin, left_.size());  // not of null
-    if (length == left_.size()) {
+    const std::string_view text = text_in(left_);
+    if (text.size() == left_.size()) {
       fail();
       return {};
     }
-    left_ = left_.subspan(length + 1);
-    return {begin, length};
+    left_ = left_.subspan(text.size() + 1);
+    return text;
   }
   void skip(std::uint64_t count) noexcept { (void)take(count); }
   [[nodiscard]] ByteReader part(std::uint64_t count) noexcept { return ByteReader(take(count)); }

@@ -5,12 +5,19 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <string_view>
 
 namespace plchost {
 
-// Every read of an ELF file goes through these two: nothing that the file says about itself is believed.
+// Every read of an ELF file goes through these: nothing that the file says about itself is believed.
 
 using ElfBytes = std::span<const std::byte>;
+
+/// As far as the first zero, or the end.
+inline std::string_view text_in(ElfBytes bytes) noexcept {
+  const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return all.substr(0, all.find('\0'));
+}
 
 /// A part of the file, or nothing if it does not lie wholly within.
 [[nodiscard]] inline std::optional<ElfBytes> elf_slice(ElfBytes file, std::uint64_t offset,

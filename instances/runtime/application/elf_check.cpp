@@ -217,12 +217,10 @@ Result<void> check_elf_can_leave(ElfBytes file) {
     if (symbol->st_shndx == SHN_UNDEF || ELF64_ST_BIND(symbol->st_info) != STB_GNU_UNIQUE) continue;
     const ElfBytes rest =
         exported.names.subspan(std::min<std::size_t>(symbol->st_name, exported.names.size()));
-    const auto* const name = reinterpret_cast<const char*>(rest.data());
-    const std::size_t length = rest.empty() ? 0 : ::strnlen(name, rest.size());  // not of null
     return failure(ErrorCode::unsupported,
                    fmt::format("has symbols that exist once in a process ('{}'), so that it would share them "
                                "with the version that runs: build it with -fno-gnu-unique",
-                               shown({name, length})));
+                               shown(text_in(rest))));
   }
   return {};
 }

@@ -98,10 +98,8 @@ std::string ElfFile::text(const Section& section, std::uint64_t from) const {
   constexpr std::size_t kFirst = 256;
   for (const std::size_t most : {kFirst, kMostOfAText}) {
     const auto bytes = read(section, from, most);
-    if (bytes.empty()) return {};
-    const auto* const begin = reinterpret_cast<const char*>(bytes.data());
-    const std::size_t length = ::strnlen(begin, bytes.size());
-    if (length < bytes.size() || bytes.size() < most || most == kMostOfAText) return {begin, length};
+    const std::string_view text = text_in(bytes);
+    if (text.size() < bytes.size() || bytes.size() < most || most == kMostOfAText) return std::string(text);
   }
   return {};
 }

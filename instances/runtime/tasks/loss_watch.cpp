@@ -81,7 +81,7 @@ std::vector<LossWatch::Found> LossWatch::find_new(const CoreRecord& record) cons
 TimePoint LossWatch::fault_of(std::size_t task) {
   TimePoint& at = of_task_[task].fault;
   const FaultRecord* const fault = tasks_.task(task).fault().published();
-  if (fault != nullptr && at == TimePoint{}) at = time_of(*fault);
+  if (fault != nullptr && at == TimePoint{}) at = time_of_fault(fault->unix_ns);
   return at;
 }
 

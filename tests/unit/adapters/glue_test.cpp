@@ -327,7 +327,8 @@ TEST_F(MatiecGlue, PlacesLocationsApartAsInOpenPlc) {
   const Glue apart = write(programs, "", tasks, located, "locations = 'separate'");
   EXPECT_THAT(texts(apart.problems), IsEmpty()) << "each task has outputs of its own";
   EXPECT_THAT(apart.text, HasSubstr("{\"__QW0\", 'Q', 2, -1, 0, 2048u, &plchost_value_0}"));
-  EXPECT_THAT(apart.text, HasSubstr("{\"location-QW0\", 16385u},\n"));
+  EXPECT_THAT(apart.text, HasSubstr("plchost_locations[] = {\n  {\"location-QW0\", 16385u},\n"
+                                    "  {\"location-QX0.1\", 2u},\n  {0}}"));
   EXPECT_THAT(apart.text, HasSubstr("{\"__QX0_1\", 'Q', 1, 1, 0, 0u, &plchost_value_1}"));
 }
 

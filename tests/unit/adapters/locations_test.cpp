@@ -90,7 +90,9 @@ TEST_F(PlacedLocations, AreAllListedForAnOnlineChange) {
               ElementsAre(Listed{"%IX0.0", *place_of("%IX0.0")}, Listed{"%IW0.1", *place_of("%IW2")},
                           Listed{"%IW1", *place_of("%IW1")}));
   const Locations apart = of(declared, "locations = 'separate'");
-  EXPECT_THAT(apart.places(), ::testing::Contains(Listed{"%IW1", *apart.place("%IW1")}));
+  EXPECT_THAT(apart.places(),
+              ElementsAre(Listed{"%IX0.0", *apart.place("%IX0.0")}, Listed{"%IW0.1", *apart.place("%IW0.1")},
+                          Listed{"%IW1", *apart.place("%IW1")}));
 }
 
 TEST_F(PlacedLocations, LieApartByWidthAsInOpenPlc) {

@@ -379,9 +379,7 @@ TEST_F(ExceptionHistoryTest, RefusesAFileOfManyLevels) {
 TEST(TimeOfAFault, IsNoneToComeWhateverAStrangerHasWritten) {
   using Limits = std::numeric_limits<std::int64_t>;
   for (const std::int64_t unix_ns : {Limits::min(), std::int64_t{-1}, Limits::max()}) {
-    FaultRecord record;
-    record.unix_ns = unix_ns;
-    const TimePoint at = time_of(record);
+    const TimePoint at = time_of_fault(unix_ns);
     EXPECT_LE(at, MonotonicClock::now()) << unix_ns;
   }
 }
