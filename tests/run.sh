@@ -144,7 +144,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
 build_asan() { build_sanitized .build/asan "address;undefined" all; }
-build_tsan() { build_sanitized .build/tsan thread plchost_tests; }
+build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_PLCCTL="$PWD/$build/bin/plcctl"; }
 build_threads() { build_sanitized .build/threads thread plchost_tests -DPLCHOST_ALL_THREADS=ON; }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/c_files.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prose.py && tests/gates/prove.sh; }
 
@@ -179,11 +179,11 @@ tidy() {
     cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
-# As users build: file by file.
+# As users build: file by file. All of them would take as long as clang-tidy, so each commit has a fifth, and what was changed last.
 alone() {
   configure .build/alone -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF \
     -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug &&
-    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py .build/alone
+    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py --share 5 .build/alone
 }
 
 # One fuzzer starts a program that the plain build has made. Optimized, they would take nearly twice as long to compile.
@@ -244,7 +244,7 @@ case "${1:-}" in
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
     join tidy "clang-tidy"
-    join alone "each file compiles by itself"
+    join alone "files compile by themselves: a fifth, and those of the last commits"
     join build_fuzzers "fuzzers: build"
     run "fuzzers" fuzz
     run "nothing is left behind" tests/left_behind.py end "$own/before"

@@ -3,9 +3,9 @@
 
 Usage: stalls.py [--accounts FILE] CORE FILE
 
-Sleeps on that core, 10 ms at a time, and ends with the process that has started it. Each sleep that takes longer than 100 ms
+Sleeps on that core, 50 ms at a time, and ends with the process that has started it. Each sleep that takes longer than 100 ms
 becomes a line of FILE. Its three numbers are in seconds: when it began (CLOCK_MONOTONIC), how long it took, and how long the core
-did nothing meanwhile.
+did nothing meanwhile, but for the 50 ms.
 A core that computes keeps this process waiting, too, but then the kernel's accounts have that time. A core that does nothing
 although a process wants to run stands still: its virtual machine has no time, or is stopped.
 --accounts  what the kernel has counted for each core (default: /proc/stat)
@@ -20,7 +20,7 @@ import subprocess
 import sys
 import time
 
-BEAT = 0.01  # s: with one reading of the accounts it costs 4 ms of a core in each second
+BEAT = 0.05  # s: with one reading of the accounts it costs 4 to 10 ms of a core in each second
 NOTED = 0.1  # s: sleeps that take longer are lines of the file
 # The shortest stall that counts. Measured for 86 minutes on a virtual machine of two cores with a load of 3 to 25: tests, builds and
 # the benchmark, whose threads have real-time priorities. 648 sleeps took longer than 50 ms, 146 longer than 250 ms, and one
@@ -49,7 +49,7 @@ def watch(core, file, accounts):
         time.sleep(BEAT)
         began, at, before, work = at, time.monotonic(), work, worked(accounts, core)
         if at - began > NOTED:
-            os.write(told, f"{began:.3f} {at - began:.3f} {max(0, at - began - (work - before)):.3f}\n".encode())
+            os.write(told, f"{began:.3f} {at - began:.3f} {max(0, at - began - BEAT - (work - before)):.3f}\n".encode())
 
 
 class Stalls:

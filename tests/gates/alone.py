@@ -1,25 +1,55 @@
 #!/usr/bin/env python3
 """Each file of the product compiles by itself, and has the definition of each template that it uses.
 
-Usage: alone.py BUILD   prints the errors; the exit code is 1 if there are any
+Usage: alone.py [--share N] BUILD   prints the errors; the exit code is 1 if there are any
 
 A user builds file by file. Our own builds join files (CMAKE_UNITY_BUILD), and there one of them has the includes of another.
 BUILD is configured for clang without joining; its generated and precompiled headers are made. No code is generated from a file:
 a template that is used and not defined is an error of the linker otherwise, and of the compiler here.
+
+--share N  only each N-th file, other ones for each commit, and all that the last commits have changed: the file, or a header
+           that it names. Where git does not know them, only each N-th one
 """
 
+import argparse
 import concurrent.futures
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
+import zlib
 
 DEFINED = "-Werror=undefined-func-template"
 # Tables of templates that the file of each policy, and of each kind of task, instantiates.
 TABLES = ("schedulers/policies/registry.cpp", "schedulers/tasks/task_kind.cpp")
 ONLY_OF_GCC = "-fno-gnu-unique"
+LAST_COMMITS = 10
+OUR_INCLUDE = re.compile(r'^#include "(.+)"', re.MULTILINE)
+TOP = pathlib.Path(__file__).resolve().parents[2]
+
+
+def git(*words):
+    try:
+        done = subprocess.run(["git", "-C", str(TOP), *words], capture_output=True, text=True, check=False)
+    except OSError:
+        return ""  # it is not installed
+    return done.stdout if done.returncode == 0 else ""
+
+
+def of_share(entries, share):
+    commit = git("rev-parse", "HEAD")
+    changed = {str(TOP / name) for name in git("diff", "--name-only", f"HEAD~{LAST_COMMITS}").splitlines()}
+
+    def is_changed(file):
+        included = OUR_INCLUDE.findall(pathlib.Path(file).read_text(encoding="utf-8"))
+        return file in changed or any(str(TOP / name) in changed for name in included)
+
+    def is_in_turn(file):
+        return zlib.crc32((commit + file.removeprefix(str(TOP))).encode()) % share == 0
+    return [entry for entry in entries if is_in_turn(entry["file"]) or is_changed(entry["file"])]
 
 
 def compile_alone(entry):
@@ -32,9 +62,15 @@ def compile_alone(entry):
 
 
 def main():
-    build = pathlib.Path(sys.argv[1]).resolve()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--share", type=int, default=1)
+    parser.add_argument("build", type=pathlib.Path)
+    arguments = parser.parse_args()
+    build = arguments.build.resolve()
     entries = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
     entries = [entry for entry in entries if build not in pathlib.Path(entry["file"]).parents]
+    if arguments.share > 1:
+        entries = of_share(entries, arguments.share)
     if not entries:
         sys.exit(f"there is no file in {build}/compile_commands.json")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
