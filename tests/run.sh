@@ -172,18 +172,19 @@ count() { # adds up the summary of the step that just ran
   grep -E '^(skipped|left out|second run|further round|stalls): ' "$log" >>"$notes" || true
 }
 
-# Over the product's code; the tests are compiled with all warnings as errors like everything else.
+# Over the product's code; the tests are compiled with all warnings as errors like everything else. clang-tidy and the check of
+# single files take too long for all of it. Each commit has an eighth, and what was changed last.
 tidy() {
   configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug \
     -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON "${unity[@]}" &&
-    cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
+    cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh --share 8 "$PWD/.build/tidy"
 }
 
-# As users build: file by file. All of them would take as long as clang-tidy, so each commit has a fifth, and what was changed last.
+# As users build: file by file.
 alone() {
   configure .build/alone -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF \
     -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug &&
-    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py --share 5 .build/alone
+    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py --share 8 .build/alone
 }
 
 # One fuzzer starts a program that the plain build has made. Optimized, they would take nearly twice as long to compile.
@@ -243,8 +244,8 @@ case "${1:-}" in
     join build_tsan "thread sanitizer: build"
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
-    join tidy "clang-tidy"
-    join alone "files compile by themselves: a fifth, and those of the last commits"
+    join tidy "clang-tidy: an eighth, and what was changed last"
+    join alone "files compile by themselves: likewise"
     join build_fuzzers "fuzzers: build"
     run "fuzzers" fuzz
     run "nothing is left behind" tests/left_behind.py end "$own/before"

@@ -7,8 +7,7 @@ A user builds file by file. Our own builds join files (CMAKE_UNITY_BUILD), and t
 BUILD is configured for clang without joining; its generated and precompiled headers are made. No code is generated from a file:
 a template that is used and not defined is an error of the linker otherwise, and of the compiler here.
 
---share N  only each N-th file, other ones for each commit, and all that the last commits have changed: the file, or a header
-           that it names. Where git does not know them, only each N-th one
+--share N  only each N-th file, and what was changed last (in_turn.py)
 """
 
 import argparse
@@ -16,40 +15,16 @@ import concurrent.futures
 import json
 import os
 import pathlib
-import re
 import shlex
 import subprocess
 import sys
-import zlib
+
+from in_turn import in_turn
 
 DEFINED = "-Werror=undefined-func-template"
 # Tables of templates that the file of each policy, and of each kind of task, instantiates.
 TABLES = ("schedulers/policies/registry.cpp", "schedulers/tasks/task_kind.cpp")
 ONLY_OF_GCC = "-fno-gnu-unique"
-LAST_COMMITS = 10
-OUR_INCLUDE = re.compile(r'^#include "(.+)"', re.MULTILINE)
-TOP = pathlib.Path(__file__).resolve().parents[2]
-
-
-def git(*words):
-    try:
-        done = subprocess.run(["git", "-C", str(TOP), *words], capture_output=True, text=True, check=False)
-    except OSError:
-        return ""  # it is not installed
-    return done.stdout if done.returncode == 0 else ""
-
-
-def of_share(entries, share):
-    commit = git("rev-parse", "HEAD")
-    changed = {str(TOP / name) for name in git("diff", "--name-only", f"HEAD~{LAST_COMMITS}").splitlines()}
-
-    def is_changed(file):
-        included = OUR_INCLUDE.findall(pathlib.Path(file).read_text(encoding="utf-8"))
-        return file in changed or any(str(TOP / name) in changed for name in included)
-
-    def is_in_turn(file):
-        return zlib.crc32((commit + file.removeprefix(str(TOP))).encode()) % share == 0
-    return [entry for entry in entries if is_in_turn(entry["file"]) or is_changed(entry["file"])]
 
 
 def compile_alone(entry):
@@ -69,8 +44,8 @@ def main():
     build = arguments.build.resolve()
     entries = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
     entries = [entry for entry in entries if build not in pathlib.Path(entry["file"]).parents]
-    if arguments.share > 1:
-        entries = of_share(entries, arguments.share)
+    chosen = in_turn([entry["file"] for entry in entries], arguments.share)
+    entries = [entry for entry in entries if entry["file"] in chosen]
     if not entries:
         sys.exit(f"there is no file in {build}/compile_commands.json")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:

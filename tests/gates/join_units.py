@@ -1,19 +1,23 @@
 #!/usr/bin/env python3
 """Joins the units of a unity build, so that clang-tidy reads the headers of others once for many files.
 
-Usage: join_units.py BUILD
+Usage: join_units.py [--share N] BUILD
 
 It writes BUILD/joined/ with the joined files and their compile_commands.json. It prints the path of each file that
 clang-tidy has to read, the folder of its compile commands and the units that were joined in it, separated by tabs.
 
 Units of libraries are joined, each with others of its top-level folder. All other units stay as they are: programs and
 shared objects use names a second time that others of the folder have, and few units have another language version.
+
+--share N  only each N-th source, and what was changed last (in_turn.py)
 """
 
+import argparse
 import json
 import pathlib
 import re
-import sys
+
+from in_turn import in_turn
 
 SOURCES = 75  # in one file at most
 FLAG = re.compile(r"-isystem \S+|-(?:D|I|std=)\S+")
@@ -29,6 +33,16 @@ class Unit:
         self.folder = self.file.removeprefix(f"{build}/").split("/", maxsplit=1)[0]
         texts = [entry["command"], *(pathlib.Path(source).read_text(encoding="utf-8") for source in self.sources)]
         self.alone = not self.sources or "-std=c++23" not in self.flags or any(ENDS.search(text) for text in texts)
+
+    def read(self):
+        return self.sources or [self.file]
+
+    def keep(self, chosen):
+        """Keeps only those sources, and says whether there are any. A unit that stays as it is is read with all of its sources."""
+        kept = [source for source in self.read() if source in chosen]
+        if not self.alone:
+            self.sources = kept
+        return bool(kept)
 
     def takes(self, others):
         return not self.alone and others and not others[-1].alone and others[-1].folder == self.folder and (
@@ -46,16 +60,23 @@ def groups_of(units):
 
 
 def main():
-    build = pathlib.Path(sys.argv[1]).resolve()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--share", type=int, default=1)
+    parser.add_argument("build", type=pathlib.Path)
+    arguments = parser.parse_args()
+    build = arguments.build.resolve()
     entries = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
     # Those of the precompiled headers are empty.
     units = [Unit(entry, build) for entry in {entry["file"]: entry for entry in entries}.values()
              if entry["file"].endswith((".cpp", ".cxx")) and "plchost_headers.dir" not in entry["file"]]
+    chosen = in_turn([source for unit in units for source in unit.read()], arguments.share)
+    # Groups are those of all sources, which are known to have no name twice.
+    groups = [[unit for unit in group if unit.keep(chosen)] for group in groups_of(units)]
     folder = build / "joined"
     folder.mkdir(exist_ok=True)
     commands = []
-    for number, group in enumerate(groups_of(units)):
-        if len(group) == 1:
+    for number, group in enumerate(group for group in groups if group):
+        if group[0].alone:
             print(group[0].file, build, sep="\t")
             continue
         file = folder / f"joined_{number}.cpp"

@@ -393,6 +393,22 @@ printf '#include "shm/base/planted.hpp"\n#include "shm/base/planted_definition.h
 echo '[]' >"$plot/alone/compile_commands.json"
 must_be_red "alone: nothing" "there is no file in" "$gates/alone.py" "$plot/alone"
 
+# What was changed last is read, and all where nothing is known of it.
+turns=$plot/turns
+mkdir -p "$turns/tests/gates"
+cp "$gates/in_turn.py" "$turns/tests/gates/"
+touch "$turns/old.cpp" "$turns/new.cpp" "$turns/new.hpp"
+echo '#include "new.hpp"' >"$turns/names_new.cpp"
+read_of() { (cd "$turns/tests/gates" && python3 -c 'import in_turn, pathlib; print(*sorted(pathlib.Path(file).name for file in in_turn.in_turn(
+  [str(file) for file in in_turn.TOP.glob("*.cpp")], 10**9)))'); }
+commit() { git -C "$turns" -c user.name=gate -c user.email=gate@localhost commit -q --allow-empty -m "$1"; }
+[ "$(read_of)" = "names_new.cpp new.cpp old.cpp" ] || { echo "without git, not all files are read: $(read_of)"; failed=1; }
+git init -q "$turns"
+git -C "$turns" add . && commit first
+echo '//' | tee "$turns/new.cpp" "$turns/new.hpp" >/dev/null
+git -C "$turns" add . && for number in {2..41}; do commit "$number"; done
+[ "$(read_of)" = "names_new.cpp new.cpp" ] || { echo "what was changed last is not read: $(read_of)"; failed=1; }
+
 cat >"$plot/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.25)
 project(planted C CXX)

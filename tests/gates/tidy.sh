@@ -1,8 +1,13 @@
 #!/usr/bin/env bash
 # clang-tidy over all translation units of a build, or over the files named. Most of the work is the headers of others:
 # it is quickest in a unity build, whose units are joined further.
-# Usage: tidy.sh BUILD [FILE...]
+# Usage: tidy.sh [--share N] BUILD [FILE...]   --share: only each N-th source, and what was changed last (in_turn.py)
 set -euo pipefail
+share=1
+if [ "$1" = --share ]; then
+  share=$2
+  shift 2
+fi
 build=$1
 shift
 cd "$(dirname "$0")/../.."
@@ -28,7 +33,7 @@ export -f tidy check
 # clang reads the compile commands of g++; flags that only g++ knows are not its business
 sed -i 's/ -fno-gnu-unique//g' "$build/compile_commands.json"
 if [ $# -eq 0 ]; then
-  units=$(tests/gates/join_units.py "$build")
+  units=$(tests/gates/join_units.py --share "$share" "$build")
 else
   units=$(printf "%s\t$build\n" "$@")
 fi

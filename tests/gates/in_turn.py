@@ -1,0 +1,35 @@
+"""Which sources a gate reads that takes too long to read them all: every N-th one, other ones for each commit, and all that the last
+commits have changed: the file, or a header that it names. Where git does not know these commits, all."""
+
+import pathlib
+import re
+import subprocess
+import zlib
+
+LAST_COMMITS = 40
+OUR_INCLUDE = re.compile(r'^#include "(.+)"', re.MULTILINE)
+TOP = pathlib.Path(__file__).resolve().parents[2]
+
+
+def git(*words):
+    try:
+        done = subprocess.run(["git", "-C", str(TOP), *words], capture_output=True, text=True, check=False)
+    except OSError:
+        return None  # it is not installed
+    return done.stdout if done.returncode == 0 else None
+
+
+def in_turn(files, share):
+    """Those of these files, which are absolute paths. A share of 1 is all."""
+    commit, names = git("rev-parse", "HEAD"), git("diff", "--name-only", f"HEAD~{LAST_COMMITS}")
+    if share == 1 or commit is None or names is None:
+        return set(files)
+    changed = {str(TOP / name) for name in names.splitlines()}
+
+    def is_changed(file):
+        included = OUR_INCLUDE.findall(pathlib.Path(file).read_text(encoding="utf-8"))
+        return file in changed or any(str(TOP / name) in changed for name in included)
+
+    def is_next(file):
+        return zlib.crc32((commit + file.removeprefix(str(TOP))).encode()) % share == 0
+    return {file for file in files if is_next(file) or is_changed(file)}
