@@ -393,7 +393,7 @@ printf '#include "shm/base/planted.hpp"\n#include "shm/base/planted_definition.h
 echo '[]' >"$plot/alone/compile_commands.json"
 must_be_red "alone: nothing" "there is no file in" "$gates/alone.py" "$plot/alone"
 
-# What was changed last is read, and all where nothing is known of it.
+# The last changes are read, and all files where git knows no change.
 turns=$plot/turns
 mkdir -p "$turns/tests/gates"
 cp "$gates/in_turn.py" "$turns/tests/gates/"
@@ -407,7 +407,7 @@ git init -q "$turns"
 git -C "$turns" add . && commit first
 echo '//' | tee "$turns/new.cpp" "$turns/new.hpp" >/dev/null
 git -C "$turns" add . && for number in {2..41}; do commit "$number"; done
-[ "$(read_of)" = "names_new.cpp new.cpp" ] || { echo "what was changed last is not read: $(read_of)"; failed=1; }
+[ "$(read_of)" = "names_new.cpp new.cpp" ] || { echo "the last changes are not read: $(read_of)"; failed=1; }
 
 cat >"$plot/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.25)
