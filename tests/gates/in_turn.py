@@ -1,5 +1,8 @@
-"""Which sources a gate reads that takes too long to read them all: every N-th one, other ones for each commit, and all that the last
-commits have changed: the file, or a header that it names. Where git does not know these commits, all."""
+"""The sources that a gate reads if it would take too long to read all of them.
+
+Each commit has every N-th one, other ones than the commit before, and all that the last commits have changed: the file, or a header
+that it names. Where git does not know these commits, all are read.
+"""
 
 import pathlib
 import re
