@@ -1,7 +1,7 @@
 """The sources that a gate reads if it would take too long to read all of them.
 
 Each commit has every N-th one, other ones than the commit before, and all that the last commits have changed: the file, or a header
-that it names. Where git does not know these commits, all are read.
+that it names. Where git knows only this commit, every second one is read, and without git all are.
 """
 
 import pathlib
@@ -24,10 +24,12 @@ def git(*words):
 
 def in_turn(files, share):
     """Those of these files, which are absolute paths. A share of 1 is all."""
-    commit, names = git("rev-parse", "HEAD"), git("diff", "--name-only", f"HEAD~{LAST_COMMITS}")
-    if share == 1 or commit is None or names is None:
+    known = (git("rev-list", f"--max-count={LAST_COMMITS + 1}", "HEAD") or "").split()
+    if share == 1 or not known:
         return set(files)
-    changed = {str(TOP / name) for name in names.splitlines()}
+    commit, oldest = known[0], known[-1]
+    share = 2 if commit == oldest else share
+    changed = {str(TOP / name) for name in (git("diff", "--name-only", oldest) or "").splitlines()}
 
     def is_changed(file):
         included = OUR_INCLUDE.findall(pathlib.Path(file).read_text(encoding="utf-8"))
