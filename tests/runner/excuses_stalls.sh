@@ -88,7 +88,7 @@ suite 0 "each core is watched"
 
 # They end with it, and tell a stop in which the core has done nothing from one in which it has worked.
 core=$(python3 -c 'import os; print(min(os.sched_getaffinity(0)))')
-# stop WORKED_TICKS: its line, after a stop of half a second beside which the core is said to have worked so long
+# stop WORKED_TICKS: its line, after a stop of 0.6 s beside which the core is said to have worked so long
 stop() {
   : >"$folder/lines"
   echo "cpu$core 0 0 0 0 0 0 0 0 0 0" >"$folder/accounts"
@@ -97,7 +97,7 @@ stop() {
   until readlink "/proc/$watcher/fd"/* 2>/dev/null | grep -qxF "$folder/lines" || ! kill -0 "$watcher"; do sleep 0.05; done
   sleep 0.5
   kill -STOP "$watcher"
-  sleep 0.5
+  sleep 0.6
   echo "cpu$core $1 0 0 0 0 0 0 0 0 0" >"$folder/accounts"
   kill -CONT "$watcher"
   sleep 0.5
@@ -107,6 +107,6 @@ stop() {
   cp "$folder/lines" "$folder/said"
 }
 stop 0
-awk '$2 >= 0.45 && $3 >= 0.4 { found = 1 } END { exit !found }' "$folder/lines" || fail "a stop of a core that does nothing is not told"
+awk '$2 >= 0.45 && $3 >= 0.45 { found = 1 } END { exit !found }' "$folder/lines" || fail "a stop of a core that does nothing is not told"
 stop 100000
-awk '$2 >= 0.45 && $3 == 0 { found = 1 } $3 >= 0.4 { exit 1 } END { exit !found }' "$folder/lines" || fail "a stop of a core that works is called a stall"
+awk '$2 >= 0.45 && $3 == 0 { found = 1 } $3 >= 0.45 { exit 1 } END { exit !found }' "$folder/lines" || fail "a stop of a core that works is called a stall"
