@@ -4,7 +4,7 @@
 Usage: proof.py PROGRAMS [--only PATTERN] [--cycles N] [--seconds N] [--write FILE]
 PROGRAMS: the folder of plcctl, plchostd and plc-instance. PLCHOST_STRUCPP names the folder of the built compiler, in which the suite
 lies. PLCHOST_MATIEC names that of the other one; without it, its columns are empty. Without the suite nothing is proven, and the
-exit code is 77. --write: the table of all, between its two comments in FILE (instances/compilers.md).
+exit code is 77. --write: the table of all, between its two comments in FILE (instances/adapters/README.md).
 
 Each source gets a configuration of one task of 10 ms. For each one, and each compiler:
 build       plcctl makes an application, which plc-instance checks
