@@ -185,6 +185,8 @@ const kRanges = new Map(
   ]),
 );
 
+const kComparisons = new Set(['<', '>', '<=', '>=', '=', '<>']);
+
 const kLongNames = new Map([
   ['DATE_AND_TIME', 'DT'],
   ['TIME_OF_DAY', 'TOD'],
@@ -227,10 +229,19 @@ function exactNanoseconds(text) {
   return sum;
 }
 
-function literalAsWritten(node) {
+// What begins at the place of a node.
+function asWritten(node, text) {
   const [file, line, column] = placeOf(node);
-  const written = (lines[file]?.[line - 1] ?? '').slice(column - 1, column - 1 + node.rawValue.length);
-  return written.toUpperCase() === node.rawValue.toUpperCase() ? written : node.rawValue;
+  const written = (lines[file]?.[line - 1] ?? '').slice(column - 1, column - 1 + text.length);
+  return written.toUpperCase() === text.toUpperCase() ? written : text;
+}
+
+function withoutParentheses(node) {
+  return node?.kind === 'ParenthesizedExpression' ? withoutParentheses(node.expression) : node;
+}
+
+function typeOf(node) {
+  return kLongNames.get(node?.resolvedType?.name) ?? node?.resolvedType?.name;
 }
 
 // By file, line and column.
@@ -241,7 +252,7 @@ function byPlace({ place: one }, { place: other }) {
 // Why a literal becomes another value in C++; undefined: it does not.
 function literalProblem(node, isInitial, nanosecondsOf) {
   if (node.kind !== 'LiteralExpression' || (node.typePrefix ?? '') !== '') return undefined;
-  const text = literalAsWritten(node);
+  const text = asWritten(node, node.rawValue);
   if (node.literalType === 'INT' && !isInitial && !text.includes('#')) {
     const value = integerOf(node);
     if (value !== undefined && String(value) !== String(node.value)) return `STruC++ makes ${node.value} of ${text}; write it with its type, as LINT#${text}`;
@@ -281,8 +292,11 @@ class Plan {
     return classes;
   }
 
+  // A block that others extend is seen several times.
   remark(node, text) {
-    this.remarks.push({ place: placeOf(node), text });
+    const place = placeOf(node);
+    if (this.remarks.some((one) => one.text === text && String(one.place) === String(place))) return;
+    this.remarks.push({ place, text });
   }
 
   // Whether values of a type cannot be copied from one version of the program to another.
@@ -334,6 +348,7 @@ class Plan {
     const element = declaration.type.elementTypeName?.toUpperCase();
     const type = element ?? declaration.type.name.toUpperCase();
     if (/^CTU?D(_\w+)?$/.test(type) && !this.blocks.has(type)) this.remark(node, `${name}: STruC++ counts falling edges of CD of ${type}; IEC 61131-3 counts rising ones`);
+    if (type === 'F_TRIG' && !this.blocks.has(type)) this.remark(node, `${name}: F_TRIG of STruC++ has no edge in its first cycle; that of IEC 61131-3 has one if CLK is FALSE`);
     const dimensions = declaration.type.arrayDimensions;
     if (element !== undefined && dimensions !== undefined && this.isBlock(element)) return this.elements(variable, element, dimensions);
     const isBlock = this.isBlock(declaration.type.name.toUpperCase()) && (declaration.type.referenceKind ?? 'none') === 'none';
@@ -397,9 +412,15 @@ class Plan {
     return problems.sort(byPlace);
   }
 
+  // Of the call of a standard function: DINT_TO_TIME(x), TO_TIME(x).
+  conversionOf(call) {
+    const name = call.functionName.toUpperCase();
+    const [, written, to] = /^(?:(\w+)_)?TO_(\w+)$/.exec(name) ?? [];
+    return { name, written, to, from: kLongNames.get(written) ?? written ?? typeOf(call.arguments[0]?.value), target: kLongNames.get(to) ?? to };
+  }
+
   // It has dates in days, and dates with a time in nanoseconds, and does not convert one to the other.
   checkTimes() {
-    const typeOf = (node) => kLongNames.get(node?.resolvedType?.name) ?? node?.resolvedType?.name;
     const problems = [];
     for (const node of nodesIn(this.ast)) {
       let text;
@@ -408,10 +429,7 @@ class Plan {
         const isOfDays = (left === 'DATE' && (right === 'DATE' || right === 'TIME')) || (left === 'TIME' && right === 'DATE');
         if (isOfDays) text = `STruC++ counts days here, and nanoseconds in a TIME: write DT in the place of DATE`;
       } else if (node.kind === 'FunctionCallExpression' && !this.functions.has(node.functionName.toUpperCase())) {
-        const name = node.functionName.toUpperCase();
-        const [, written, to] = /^(?:(\w+)_)?TO_(\w+)$/.exec(name) ?? [];
-        const from = kLongNames.get(written) ?? written ?? typeOf(node.arguments[0]?.value);
-        const target = kLongNames.get(to) ?? to;
+        const { name, from, target } = this.conversionOf(node);
         const isOfDates = ['DATE', 'TOD', 'DT'].includes(from) && ['DATE', 'TOD', 'DT'].includes(target) && from !== target;
         if (isOfDates) text = `${name}: STruC++ copies the number, which counts days in a DATE, and nanoseconds in TOD and DT`;
         const isLiteral = node.arguments[0]?.value?.kind === 'LiteralExpression';
@@ -443,6 +461,87 @@ class Plan {
       }
     }
     this.remarks.push(...this.remarks.splice(before).sort(byPlace));
+  }
+
+  // By name: whether it is a constant, and its type.
+  scopeOf(sections, outer) {
+    const scope = new Map(outer);
+    for (const { blockType, isConstant, declarations } of sections) {
+      for (const { names, type } of declarations) {
+        for (const name of names.map((one) => one.toUpperCase())) {
+          const isOfGlobal = blockType === 'VAR_EXTERNAL' && outer.get(name)?.isConstant === true;
+          scope.set(name, { isConstant: isConstant === true || isOfGlobal, type: type.name.toUpperCase() });
+        }
+      }
+    }
+    return scope;
+  }
+  scopeOfBlock(pou, globals, depth = 0) {
+    const base = depth < kMostBases ? this.blocks.get(pou.extends?.toUpperCase()) : undefined;
+    return this.scopeOf(pou.varBlocks, base === undefined ? globals : this.scopeOfBlock(base, globals, depth + 1));
+  }
+
+  // The compiler refuses a constant as the target of a statement only if the POU itself declares it as one.
+  checkConstants() {
+    const sections = [...this.ast.configurations.flatMap((one) => one.varBlocks), ...this.ast.globalVarBlocks];
+    const globals = this.scopeOf(sections, new Map());
+    const problems = [];
+    const check = (body, scope) => {
+      for (const node of nodesIn(body)) {
+        for (const target of this.writtenBy(node, scope)) {
+          const { kind, name, accessChain, isDereference } = target;
+          const isReached = isDereference === true || accessChain?.some((step) => step.kind === 'dereference') === true;
+          if (kind !== 'VariableExpression' || isReached || scope.get(name.toUpperCase())?.isConstant !== true) continue;
+          problems.push({ place: placeOf(target), text: `${asWritten(target, name)} is CONSTANT, and STruC++ would write it; write another variable` });
+        }
+      }
+    };
+    for (const pou of [...this.ast.programs, ...this.ast.functionBlocks, ...this.ast.functions]) {
+      const scope = this.scopeOfBlock(pou, globals);
+      check(pou.body, scope);
+      for (const method of pou.methods ?? []) check(method.body, this.scopeOf(method.varBlocks, scope));
+      for (const property of pou.properties ?? []) check([property.getter, property.setter], scope);
+    }
+    return problems.sort(byPlace);
+  }
+
+  // Variables that a statement or call writes.
+  writtenBy(node, scope) {
+    if (node.kind === 'AssignmentStatement') return [node.target];
+    if (node.kind === 'ForStatement') {
+      const { sourceSpan } = node;
+      return [{ kind: 'VariableExpression', name: nameAsWritten({ name: node.controlVariable, sourceSpan }, 'FOR'), sourceSpan }];
+    }
+    if (node.kind === 'MethodCallExpression') return node.arguments.filter((one) => one.isOutput).map((one) => one.value);
+    if (node.kind !== 'FunctionCallExpression') return [];
+    const name = node.functionName.toUpperCase();
+    const called = this.blocks.get(scope.get(name)?.type) ?? this.ast.functions.find((one) => one.name.toUpperCase() === name);
+    const namesOf = (sections) => sections.flatMap(({ declarations }) => declarations.flatMap(({ names }) => names.map((one) => one.toUpperCase())));
+    const ofCaller = called?.varBlocks.filter(({ blockType }) => ['VAR_INPUT', 'VAR_OUTPUT', 'VAR_IN_OUT'].includes(blockType)) ?? [];
+    const parameters = namesOf(ofCaller);
+    const written = new Set(namesOf(ofCaller.filter(({ blockType }) => blockType === 'VAR_IN_OUT')));
+    return node.arguments.filter((one, i) => one.isOutput || written.has(one.name?.toUpperCase() ?? parameters[i])).map((one) => one.value);
+  }
+
+  // Values that MATIEC makes as IEC 61131-3 says, and this compiler does not. Roundings are the last ones, as there can be many.
+  checkDifferences() {
+    const [values, roundings] = [[], []];
+    for (const node of nodesIn(this.ast)) {
+      const tell = (list, text) => list.push({ place: placeOf(node), text });
+      if (node.kind === 'BinaryExpression' && kComparisons.has(node.operator)) {
+        const wraps = (one) => one?.kind === 'BinaryExpression' && one.operator === '-' && (typeOf(one) === 'USINT' || typeOf(one) === 'UINT');
+        const difference = [node.left, node.right].map(withoutParentheses).find(wraps);
+        if (difference !== undefined) tell(values, `this difference of ${typeOf(difference)} wraps before STruC++ compares it: assign it first`);
+      }
+      if (node.kind !== 'FunctionCallExpression' || this.functions.has(node.functionName.toUpperCase())) continue;
+      const { name, written, to, from, target } = this.conversionOf(node);
+      const isNumber = (type) => kRanges.has(type) || type === 'REAL' || type === 'LREAL';
+      if ((written === 'TIME' && isNumber(to)) || (isNumber(written) && to === 'TIME')) tell(values, `${name}: STruC++ counts milliseconds, and MATIEC seconds`);
+      const given = withoutParentheses(node.arguments[0]?.value);
+      const isSure = given?.kind === 'LiteralExpression' && Math.abs(Number(given.value)) % 1 !== 0.5;
+      if ((from === 'REAL' || from === 'LREAL') && kRanges.has(target) && !isSure) tell(roundings, `${name}: STruC++ rounds 2.5 to 3, and IEC 61131-3 to 2`);
+    }
+    this.remarks.push(...values.sort(byPlace), ...roundings.sort(byPlace));
   }
 
   // As the compiler calls a member, which it does not always call as the source does.
@@ -688,11 +787,12 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
-  plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()), ...found.checkTimes());
+  plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()), ...found.checkTimes(), ...found.checkConstants());
   for (const { number, line, name, location, isTaken } of places.values()) {
     if (isTaken !== true) plan.problems.push({ place: [number, line, 0], text: `${name} AT ${location}: the declaration is not understood` });
   }
   found.checkLoops();
+  found.checkDifferences();
   const { table, skipped } = await debugTable(result);
   plan.symbols = symbolsOf(table);
   plan.hidden = hiddenOf(skipped);

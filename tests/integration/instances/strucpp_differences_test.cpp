@@ -1,0 +1,120 @@
+// Values that STruC++ makes other than IEC 61131-3 says, and other than MATIEC: a build tells each at its
+// place.
+
+#include <initializer_list>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/integration/instances/structured_text_fixture.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const std::string kTask =
+    "RESOURCE r ON PLC TASK t (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM m WITH t : Prg; END_RESOURCE "
+    "END_CONFIGURATION\n";
+
+class DifferencesOfStrucpp : public StructuredText {
+ protected:
+  void SetUp() override {
+    if (!has("PLCHOST_STRUCPP")) GTEST_SKIP() << "needs STruC++";
+  }
+
+  /// The program has three lines before its statements.
+  ProgramEnd built(const std::string& variables, const std::string& statements,
+                   const std::string& before = "") const {
+    return build(fmt::format("{}\nPROGRAM Prg\nVAR {} END_VAR\n{}\nEND_PROGRAM\nCONFIGURATION k {}", before,
+                             variables, statements, kTask),
+                 "other", "strucpp");
+  }
+  static void expect_told(const ProgramEnd& end, std::initializer_list<const char*> told) {
+    for (const std::string one : told) {
+      const auto first = end.output.find(one);
+      EXPECT_NE(first, std::string::npos) << one << "\n" << end.output;
+      EXPECT_EQ(end.output.find(one, first + 1), std::string::npos) << one << " is told twice";
+    }
+  }
+};
+
+TEST_F(DifferencesOfStrucpp, AConstantThatIsWrittenIsRefused) {
+  const ProgramEnd end = build(R"(
+FUNCTION_BLOCK Fb VAR_IN_OUT x : INT; END_VAR VAR_OUTPUT o : INT; END_VAR VAR_EXTERNAL limit : INT; END_VAR
+METHOD Shadows : INT VAR limit : INT; END_VAR limit := 3; END_METHOD
+METHOD Touches : INT VAR n : INT; END_VAR limit := n; END_METHOD
+x := 1; END_FUNCTION_BLOCK
+FUNCTION Fu : INT VAR_INPUT a : INT; END_VAR VAR_IN_OUT b : INT; END_VAR b := a; Fu := 1; END_FUNCTION
+PROGRAM Prg VAR_EXTERNAL Limit, free : INT; row : ARRAY[0..2] OF INT; END_VAR VAR b : Fb; i : INT; END_VAR
+free := Limit; b(x := i, o => free); i := Fu(Limit, i);
+Limit := 5;
+row[1] := 4;
+FOR Limit := 1 TO 3 DO i := i + 1; END_FOR;
+b(x := i, o => Limit);
+b(x := Limit);
+i := Fu(i, Limit);
+END_PROGRAM
+CONFIGURATION k VAR_GLOBAL CONSTANT Limit : INT := 3; row : ARRAY[0..2] OF INT := [1, 2, 3]; END_VAR
+VAR_GLOBAL free : INT; END_VAR )" + kTask,
+                               "other", "strucpp");
+  EXPECT_FALSE(end.success());
+  expect_told(end, {"other.st:4:43: limit is CONSTANT", "other.st:9:1: Limit is CONSTANT",
+                    "other.st:10:1: row is CONSTANT", "other.st:11:1: Limit is CONSTANT",
+                    "other.st:12:16: Limit is CONSTANT", "other.st:13:8: Limit is CONSTANT",
+                    "other.st:14:12: Limit is CONSTANT"});
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:3:")));
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:8:")));
+}
+
+TEST_F(DifferencesOfStrucpp, TheFirstCycleOfAFallingEdgeIsTold) {
+  const ProgramEnd end = built("edge1 : F_TRIG; rising : R_TRIG;\n  h : Heir;", "edge1(CLK := FALSE);",
+                               "FUNCTION_BLOCK Base VAR inner : F_TRIG; END_VAR inner(); END_FUNCTION_BLOCK "
+                               "FUNCTION_BLOCK Heir EXTENDS Base VAR n : INT; END_VAR n := 1; "
+                               "END_FUNCTION_BLOCK");
+  ASSERT_TRUE(end.success()) << end.output;
+  expect_told(end, {"other.st:3:5: note: edge1: F_TRIG of STruC++ has no edge in its first cycle",
+                    "other.st:1:25: note: inner: F_TRIG of STruC++ has no edge in its first cycle"});
+  EXPECT_THAT(end.output, Not(HasSubstr("rising: ")));
+}
+
+TEST_F(DifferencesOfStrucpp, RoundingIsToldWhereItCanMatter) {
+  const ProgramEnd end = built("r : REAL; l : LREAL; i : INT; d : DINT;",
+                               "i := REAL_TO_INT(r);\nd := LREAL_TO_DINT(l) + TO_DINT(r);\n"
+                               "d := REAL_TO_DINT(2.5);\nd := REAL_TO_DINT(3.0); r := "
+                               "DINT_TO_REAL(d); i := DINT_TO_INT(d);");
+  ASSERT_TRUE(end.success()) << end.output;
+  const char* const rounds = "STruC++ rounds 2.5 to 3, and IEC 61131-3 to 2";
+  EXPECT_THAT(end.output, HasSubstr(fmt::format("other.st:4:6: note: REAL_TO_INT: {}", rounds)));
+  EXPECT_THAT(end.output, HasSubstr(fmt::format("other.st:5:6: note: LREAL_TO_DINT: {}", rounds)));
+  EXPECT_THAT(end.output, HasSubstr(fmt::format("other.st:5:25: note: TO_DINT: {}", rounds)));
+  EXPECT_THAT(end.output, HasSubstr(fmt::format("other.st:6:6: note: REAL_TO_DINT: {}", rounds)));
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:7:")));
+}
+
+TEST_F(DifferencesOfStrucpp, UnitsOfTimesAreTold) {
+  const ProgramEnd end = built("t : TIME; d : DINT; r : REAL;",
+                               "d := TIME_TO_DINT(t);\nt := DINT_TO_TIME(d); r := TIME_TO_REAL(t);\n"
+                               "t := REAL_TO_TIME(r);\nr := DINT_TO_REAL(d); t := T#1s;");
+  ASSERT_TRUE(end.success()) << end.output;
+  expect_told(end, {"other.st:4:6: note: TIME_TO_DINT: STruC++ counts milliseconds, and MATIEC seconds",
+                    "other.st:5:6: note: DINT_TO_TIME: STruC++ counts milliseconds, and MATIEC seconds",
+                    "other.st:5:28: note: TIME_TO_REAL: STruC++ counts milliseconds, and MATIEC seconds",
+                    "other.st:6:6: note: REAL_TO_TIME: STruC++ counts milliseconds, and MATIEC seconds"});
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:7:")));
+}
+
+TEST_F(DifferencesOfStrucpp, ADifferenceThatWrapsWhereItIsComparedIsTold) {
+  const ProgramEnd end = built("u, v : USINT; w : UINT; n : UDINT; i : INT; ok : BOOL;",
+                               "ok := u - USINT#1 > USINT#0;\nok := 3 < (w - w);\n"
+                               "ok := n - n > n; ok := i - i > i; ok := u > v; u := u - v; ok := u - 1 > 0;");
+  ASSERT_TRUE(end.success()) << end.output;
+  expect_told(end, {"other.st:4:7: note: this difference of USINT wraps before STruC++ compares it",
+                    "other.st:5:7: note: this difference of UINT wraps before STruC++ compares it"});
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:6:")));
+}
+
+}  // namespace
+}  // namespace plchost::testing
