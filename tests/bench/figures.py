@@ -82,19 +82,23 @@ def others_in_short(rows):
         f"{condition} {statistics.median(values):.0f} % (median), at most {max(values):.0f} %" for condition, values in shares.items()) + "."
 
 
-def conditions(rows):
-    """Of the run: the machine, the rounds, and what else it did."""
-    machines = {}
+def each_with_its_parts(rows, line_of):
+    """A line for each of the conditions that the rows have. If there are several, some parts were measured anew: it names them."""
+    lines = {}
     for row in rows:
-        made = row["conditions"]
-        parts = machines.setdefault((made["cores"], made["processor"], made["kernel"]), [])
+        parts = lines.setdefault(line_of(row["conditions"]), [])
         if (part := row["name"].split("/")[0]) not in parts:
             parts.append(part)
-    lines = [f"* Machine: {cores} cores, {processor}, kernel {kernel}." for cores, processor, kernel in machines]
-    if len(machines) > 1:  # parts were measured anew elsewhere; their floors are of the same machine
-        lines = [f"{line[:-1]}: {', '.join(f'`{part}`' for part in parts)}." for line, parts in zip(lines, machines.values())]
+    if len(lines) == 1:
+        return [f"{line}." for line in lines]
+    return [f"{line}: {', '.join(f'`{part}`' for part in parts)}." for line, parts in lines.items()]
+
+
+def conditions(rows):
+    """Of the run: the machine, the revision, the rounds, and what else it did."""
     rounds = spread([row["rounds"] for row in rows])
-    return [*lines,
+    return [*each_with_its_parts(rows, lambda made: f"* Machine: {made['cores']} cores, {made['processor']}, kernel {made['kernel']}"),
+            *each_with_its_parts(rows, lambda made: f"* Revision of the sources: {made.get('revision', 'unknown')}"),
             f"* {rounds} rounds of {spread(of_conditions(rows, 'each_s'))} s of each thing. A spread is the least and the most of "
             "the rounds.", *others(rows), ""]
 

@@ -1,6 +1,7 @@
 #include "tests/bench/row.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -24,6 +25,12 @@ std::string processor() {
     if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
   }
   return "unknown";
+}
+
+/// Of the sources, as run.sh says.
+std::string revision() {
+  const char* const said = std::getenv("PLCHOST_REVISION");
+  return said != nullptr && *said != '\0' ? said : "unknown";
 }
 
 ordered_json machine() {
@@ -126,6 +133,7 @@ ordered_json to_object(const Row& row) {
   }
   if (!row.note.empty()) object["note"] = row.note;
   object["conditions"] = machine();
+  object["conditions"]["revision"] = revision();
   for (const auto& [key, value] : row.conditions) object["conditions"][key].push_back(figure(value));
   return object;
 }

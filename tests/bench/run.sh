@@ -57,6 +57,9 @@ clean_up() {
 trap clean_up EXIT
 trap 'exit 130' INT TERM
 
+# Of these sources, and of no repository around them.
+PLCHOST_REVISION=$([ ! -e .git ] || git describe --always --dirty 2>/dev/null || true)
+export PLCHOST_REVISION=${PLCHOST_REVISION:-unknown}
 echo "building ..." >&2
 if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_PYTHON=OFF -DPLCHOST_ICEORYX=ON -DCMAKE_UNITY_BUILD=ON \
     -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 &&

@@ -328,6 +328,7 @@ plant_in_documents "documents: page without a link" "no link leads here from REA
 plant_in_documents "documents: long README" "lines; at most 250" README.md '1s,$,\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n,'
 plant_in_documents "documents: old figures" "is not up to date" README.md 's,^\| the same beside.*,| the same | 0.1 | 0.2 | 1 | 2 |,'
 plant_in_documents "documents: edited row of the benchmark" "is not up to date" tests/bench/figures.md '0,/\| idle \| [0-9.]+/s//| idle | 0.01/'
+plant_in_documents "documents: figures of another revision" "tests/bench/figures.md: a generated table is not up to date" tests/bench/figures.json 's,"conditions":\{,&"revision":"planted"\,,'
 plant_in_documents "documents: old topics" "is not up to date" api/contract.md '/`plc\/v1\/reply`/d'
 plant_in_documents "documents: setting without a row" "no row for the key [Retain] PostponeMs" instances/settings.md '/PostponeMs. \|/d'
 plant_in_documents "documents: unknown setting" "the code has no key [Retain] PostponeUs" instances/settings.md 's,(\[Retain\] Postpone)Ms,\1Us,'

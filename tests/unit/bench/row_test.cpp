@@ -197,6 +197,19 @@ TEST(Json, IsOneArrayWithARowForEach) {
   EXPECT_TRUE(nlohmann::json::parse(to_json({})).empty());
 }
 
+TEST(Json, HasTheRevisionOfTheSources) {
+  const auto revision = [] {
+    return nlohmann::json::parse(
+        to_json({{.name = "part/who", .ours = one_to(10)}}))[0]["conditions"]["revision"];
+  };
+  ::setenv("PLCHOST_REVISION", "1234abcd-dirty", 1);
+  EXPECT_EQ(revision(), "1234abcd-dirty");
+  ::setenv("PLCHOST_REVISION", "", 1);
+  EXPECT_EQ(revision(), "unknown");
+  ::unsetenv("PLCHOST_REVISION");
+  EXPECT_EQ(revision(), "unknown");
+}
+
 TEST(Json, HasNoFigureWhereNoneWasMeasured) {
   const auto json = nlohmann::json::parse(to_json({{.name = "part/who", .ours = one_to(10)}}));
   const auto& sut = json[0];
