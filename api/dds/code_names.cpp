@@ -14,10 +14,6 @@ std::string transition_state_name(std::uint32_t source, std::uint32_t state) {
   return source == 0 ? word_for(words::Transition::from_state, state) : instance_state_name(state);
 }
 
-std::string task_kind_name(std::uint32_t kind) {
-  return word_for(words::TaskStatus::kind, kind);
-}
-
 std::string log_level_name(std::uint32_t level) {
   return word_for(words::LogRecord::level, level);
 }
@@ -28,14 +24,6 @@ std::string log_source_name(std::uint32_t source) {
 
 std::string finding_level_name(std::uint32_t level) {
   return word_for(words::HostFinding::level, level);
-}
-
-std::string restart_policy_name(std::uint32_t policy) {
-  return word_for(words::InstanceStatus::restart_policy, policy);
-}
-
-std::string task_state_name(std::uint32_t state) {
-  return word_for(words::TaskStatus::state, state);
 }
 
 }  // namespace plchost::dds

@@ -9,11 +9,8 @@ namespace plchost::dds {
 [[nodiscard]] std::string instance_state_name(std::uint32_t state);
 /// A state of Transition: its source says of which process.
 [[nodiscard]] std::string transition_state_name(std::uint32_t source, std::uint32_t state);
-[[nodiscard]] std::string task_kind_name(std::uint32_t kind);
 [[nodiscard]] std::string log_level_name(std::uint32_t level);
 [[nodiscard]] std::string log_source_name(std::uint32_t source);
 [[nodiscard]] std::string finding_level_name(std::uint32_t level);
-[[nodiscard]] std::string restart_policy_name(std::uint32_t policy);
-[[nodiscard]] std::string task_state_name(std::uint32_t state);
 
 }  // namespace plchost::dds

@@ -33,7 +33,6 @@ namespace plchost {
 // restart_decision.hpp decides on the way out of a phase.
 // clang-format on
 enum class InstancePhase : std::uint8_t { down, held, backing_off, setting_up, adopting, up, ending };
-inline constexpr auto kInstancePhases = static_cast<std::uint8_t>(InstancePhase::ending) + 1;
 
 [[nodiscard]] std::string_view to_string(InstancePhase phase) noexcept;
 

@@ -152,7 +152,6 @@ LedgerEntry& PostLedger::entry_for(const dds::Guid& source, std::int64_t now_ns)
     }
     layout_of(memory_).forgotten.add(entries()[chosen].state().counters);
     index_.erase(dds::Guid{entries()[chosen].source});
-    ++reused_;
   }
   LedgerEntry& entry = entries()[chosen];
   entry.in_use.store(0, std::memory_order_release);

@@ -98,9 +98,6 @@ class PostLedger {
   /// Of all sources, those that were forgotten included.
   [[nodiscard]] PostCounters total() const noexcept;
 
-  /// How many entries were given away while their source may have lived.
-  [[nodiscard]] std::uint64_t reused() const noexcept { return reused_; }
-
  private:
   explicit PostLedger(MemoryFile memory, const ObjectPool& pool);
   [[nodiscard]] LedgerEntry* entries() const noexcept;
@@ -112,7 +109,6 @@ class PostLedger {
   const ObjectPool* pool_;
   std::unordered_map<dds::Guid, std::uint32_t, dds::GuidHash> index_;
   std::uint32_t next_free_ = 0;  // all from here on are free
-  std::uint64_t reused_ = 0;
 };
 
 }  // namespace plchost

@@ -230,7 +230,7 @@ TEST(StatusWords, AreThoseOfTheContract) {
   for (std::uint32_t state = 0; state <= 9; ++state) states.push_back(dds::instance_state_name(state));
   EXPECT_THAT(states, testing::ElementsAre("offline", "starting", "running", "stopped", "stopping", "waiting",
                                            "safe_mode", "failed", "exception", "9"));
-  EXPECT_EQ(dds::task_state_name(0), "created");
+  EXPECT_EQ(dds::word_for(dds::words::TaskStatus::state, 0), "created");
   EXPECT_EQ(dds::log_level_name(1), "info");
   EXPECT_EQ(dds::log_source_name(2), "output");
   EXPECT_EQ(dds::transition_state_name(0, 3), "single_cycle");
@@ -293,8 +293,8 @@ TEST(StatusWords, AreTheTextsOfTheStatesInThePrograms) {
 
 TEST(StatusWords, OfTheKindsOfTasksAreThoseOfTheirTable) {
   for (const TaskKindTraits& kind : kTaskKinds)
-    EXPECT_EQ(dds::task_kind_name(std::to_underlying(kind.kind)), kind.name);
-  EXPECT_EQ(dds::task_kind_name(kTaskKinds.size()), std::to_string(kTaskKinds.size()))
+    EXPECT_EQ(dds::word_for(dds::words::TaskStatus::kind, std::to_underlying(kind.kind)), kind.name);
+  EXPECT_EQ(dds::words::TaskStatus::kind.size(), kTaskKinds.size())
       << "the contract names a kind that is not in the table";
 }
 
