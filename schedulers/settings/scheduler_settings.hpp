@@ -3,24 +3,17 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 
+#include "schedulers/settings/task_options.hpp"
 #include "shm/base/bounds.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
-
-// The ranges of the settings. check_settings() allows programs more of the first two: tests have ticks of
-// 20 us.
-inline constexpr Bounds<Duration> kTickInFiles{.lowest = std::chrono::microseconds(50),
-                                               .highest = std::chrono::seconds(1)};
-inline constexpr Bounds<Duration> kFreewheelingCycletimeInFiles{.lowest = Duration(0),
-                                                                .highest = std::chrono::seconds(60)};
-/// 100: a freewheeling task sleeps no longer than it must.
-inline constexpr Bounds<int> kProcessorLoad{.lowest = 0, .highest = 100};
-/// More than any wake-up latency that spinning is an answer to.
-inline constexpr Bounds<Duration> kSpinAhead{.lowest = Duration(0), .highest = std::chrono::milliseconds(1)};
-inline constexpr Bounds<std::uint64_t> kEventBacklog{.lowest = 1, .highest = 1'000'000'000};
 
 /// system: a timer of the kernel. task: a thread of high priority in absolute sleeps. auxiliary: a clock
 /// device with an interrupt of its own.
@@ -29,15 +22,6 @@ enum class TickSourceKind : std::uint8_t { system, task, auxiliary };
 /// How the releases of cyclic tasks follow a reference clock: [DistributedClock]. The meaning of the gains:
 /// see ClockRegulator.
 struct DistributedClockSettings {
-  static constexpr Bounds<int> kKpPpm{.lowest = 1, .highest = 1'000'000};
-  static constexpr Bounds<int> kKiPpm{.lowest = 0, .highest = 1'000'000};
-  static constexpr Bounds<Duration> kMaxCorrection{.lowest = Duration(0),
-                                                   .highest = std::chrono::milliseconds(100)};
-  static constexpr Bounds<Duration> kWindow{.lowest = Duration(1), .highest = std::chrono::seconds(1)};
-  static constexpr Bounds<Duration> kReferenceTimeout{.lowest = std::chrono::milliseconds(1),
-                                                      .highest = std::chrono::hours(1)};
-  static constexpr Bounds<Duration> kHoldOver{.lowest = Duration(0), .highest = std::chrono::hours(1)};
-
   std::string reference;      ///< as [DistributedClock] Reference names it; empty: the application reports
   int kp_ppm = 30'000;        ///< share of a pair's deviation that moves the phase
   int ki_ppm = 200;           ///< share that moves the drift
@@ -75,6 +59,73 @@ struct SchedulerSettings {
   DistributedClockSettings distributed_clock;
   WatchdogSettings watchdog;
   bool operator==(const SchedulerSettings&) const = default;
+};
+
+/// The range of a setting, by the path to its member: of its key in files, and of programs.
+template <auto... kPath>
+struct SettingRange {
+  using Value = std::remove_cvref_t<decltype((std::declval<const SchedulerSettings&>().*....*kPath))>;
+  std::string_view name;
+  Bounds<Value> in_files;
+  Bounds<Value> in_programs = in_files;
+  std::string_view zero{};  ///< the meaning of 0, if that is a value of its own
+  [[nodiscard]] static constexpr Value of(const SchedulerSettings& settings) {
+    return (settings.*....*kPath);
+  }
+};
+template <auto kMember>
+using ScheduleRange = SettingRange<kMember>;
+template <auto kMember>
+using ClockRange = SettingRange<&SchedulerSettings::distributed_clock, kMember>;
+template <auto kMember>
+using WatchdogRange = SettingRange<&SchedulerSettings::watchdog, kMember>;
+
+/// A row for each setting with a range. Both its key in instances/runtime/settings/ and check_settings() read
+/// it.
+inline constexpr std::tuple kSettingRanges{
+    // Tests have ticks of 20 us.
+    ScheduleRange<&SchedulerSettings::scheduler_interval>{
+        .name = "scheduler_interval",
+        .in_files = {std::chrono::microseconds(50), std::chrono::seconds(1)},
+        .in_programs = {Duration(1), kMaxInterval}},
+    ScheduleRange<&SchedulerSettings::freewheeling_cycletime>{
+        .name = "freewheeling_cycletime",
+        .in_files = {Duration(0), std::chrono::seconds(60)},
+        .in_programs = {Duration(0), kMaxInterval},
+        .zero = "not set"},
+    // 100: a freewheeling task sleeps no longer than it must.
+    ScheduleRange<&SchedulerSettings::processor_load_maximum>{
+        .name = "processor_load_maximum", .in_files = {0, 100}, .zero = "not set"},
+    // More than any wake-up latency that spinning is an answer to.
+    ScheduleRange<&SchedulerSettings::spin_ahead_max>{
+        .name = "spin_ahead_max", .in_files = {Duration(0), std::chrono::milliseconds(1)}, .zero = "off"},
+    ScheduleRange<&SchedulerSettings::max_event_backlog>{.name = "max_event_backlog",
+                                                         .in_files = {1, 1'000'000'000}},
+    ClockRange<&DistributedClockSettings::kp_ppm>{.name = "distributed_clock.kp_ppm",
+                                                  .in_files = {1, 1'000'000}},
+    ClockRange<&DistributedClockSettings::ki_ppm>{.name = "distributed_clock.ki_ppm",
+                                                  .in_files = {0, 1'000'000}},
+    ClockRange<&DistributedClockSettings::max_correction>{
+        .name = "distributed_clock.max_correction",
+        .in_files = {Duration(0), std::chrono::milliseconds(100)},
+        .zero = "1 % of the interval"},
+    ClockRange<&DistributedClockSettings::sync_window>{.name = "distributed_clock.sync_window",
+                                                       .in_files = {Duration(1), std::chrono::seconds(1)}},
+    ClockRange<&DistributedClockSettings::pair_tolerance>{.name = "distributed_clock.pair_tolerance",
+                                                          .in_files = {Duration(1), std::chrono::seconds(1)}},
+    ClockRange<&DistributedClockSettings::reference_timeout>{
+        .name = "distributed_clock.reference_timeout",
+        .in_files = {std::chrono::milliseconds(1), std::chrono::hours(1)}},
+    ClockRange<&DistributedClockSettings::hold_over_limit>{.name = "distributed_clock.hold_over_limit",
+                                                           .in_files = {Duration(0), std::chrono::hours(1)}},
+    WatchdogRange<&WatchdogSettings::load_interval>{
+        .name = "watchdog.load_interval",
+        .in_files = {std::chrono::milliseconds(10), std::chrono::seconds(60)},
+        .in_programs = {Duration(1), kMaxInterval}},
+    WatchdogRange<&WatchdogSettings::default_time>{.name = "watchdog.default_time",
+                                                   .in_files = {Duration(0), std::chrono::hours(1)},
+                                                   .in_programs = {Duration(0), kMaxInterval},
+                                                   .zero = "off"},
 };
 
 /// invalid_argument: a value is out of its range; the text says which and what is allowed.

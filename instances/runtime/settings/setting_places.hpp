@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
 #include "instances/runtime/settings/settings_key.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 #include "schedulers/settings/task_options.hpp"
 #include "shm/base/bounds.hpp"
 
@@ -84,6 +86,14 @@ struct As {
 };
 
 namespace detail {
+// The range of a setting of the schedulers. One without a row in kSettingRanges does not compile.
+template <class Place>
+struct OfSchedulers : std::false_type {};
+template <auto... kPath>
+struct OfSchedulers<At<&InstanceSettings::scheduler, kPath...>> : std::true_type {
+  static constexpr const auto& range() { return std::get<SettingRange<kPath...>>(kSettingRanges).in_files; }
+};
+
 template <class Place, class Form>
 void put_number(const SettingsTarget& to, std::int64_t number) {
   Place::put(to, Form::template value<typename Place::Value>(number));
@@ -94,13 +104,30 @@ std::int64_t initial_number() {
 }
 }  // namespace detail
 
-template <class Place, class Form = AsNumber>
-constexpr NumberSetting number_setting(std::int64_t lowest, std::int64_t highest, bool capped = false) {
+namespace detail {
+template <class Place, class Form>
+constexpr NumberSetting number_within(std::int64_t lowest, std::int64_t highest, bool capped) {
   return {.lowest = lowest,
           .highest = highest,
           .apply = &detail::put_number<Place, Form>,
           .initial = &detail::initial_number<Place, Form>,
           .capped = capped};
+}
+}  // namespace detail
+
+template <class Place, class Form = AsNumber>
+constexpr NumberSetting number_setting(std::int64_t lowest, std::int64_t highest, bool capped = false) {
+  static_assert(!detail::OfSchedulers<Place>::value,
+                "a setting of the schedulers has its range in kSettingRanges");
+  return detail::number_within<Place, Form>(lowest, highest, capped);
+}
+
+/// A setting of the schedulers: its range stands in kSettingRanges.
+template <class Place, class Form = AsNumber>
+constexpr NumberSetting number_setting(bool capped = false) {
+  constexpr auto kRange = detail::OfSchedulers<Place>::range();
+  return detail::number_within<Place, Form>(Form::number(kRange.lowest), Form::number(kRange.highest),
+                                            capped);
 }
 
 template <class Place, class Form = AsNumber, class Value>
@@ -111,23 +138,24 @@ constexpr NumberSetting number_setting(const Bounds<Value>& bounds, bool capped 
 /// 0 is off, 1 is on.
 template <class Place, class Form = AsNumber>
 constexpr NumberSetting truth_setting() {
-  return number_setting<Place, Form>(0, 1);
+  return detail::number_within<Place, Form>(0, 1, false);
 }
 
 /// In the member 0 is "not set".
 template <class Place, class Form = AsNumber>
-constexpr OptionalNumberSetting optional_number_setting(const Bounds<typename Place::Value>& bounds) {
-  return {.highest = Form::number(bounds.highest),
+constexpr OptionalNumberSetting optional_number_setting() {
+  return {.highest = Form::number(detail::OfSchedulers<Place>::range().highest),
           .apply = [](const SettingsTarget& to,
                       std::int64_t given) { detail::put_number<Place, Form>(to, given < 0 ? 0 : given); },
           .initial = &detail::initial_number<Place, Form>};
 }
 
 template <class Place>
-constexpr MicrosecondSetting microsecond_setting(const Bounds<Duration>& bounds) {
+constexpr MicrosecondSetting microsecond_setting() {
   using Us = As<std::chrono::microseconds>;
-  return {.lowest = Us::number(bounds.lowest),
-          .highest = Us::number(bounds.highest),
+  constexpr Bounds<Duration> kRange = detail::OfSchedulers<Place>::range();
+  return {.lowest = Us::number(kRange.lowest),
+          .highest = Us::number(kRange.highest),
           .apply = &Place::put,
           .initial = &Place::initial};
 }

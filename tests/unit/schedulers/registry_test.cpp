@@ -1,5 +1,9 @@
 #include "schedulers/policies/registry.hpp"
 
+#include <string>
+#include <tuple>
+#include <type_traits>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,6 +74,31 @@ TEST_P(Settings, OutOfRangeIsRefusedByName) {
   EXPECT_THAT(checked.error().message, testing::HasSubstr(GetParam().name));
 }
 
+/// The result of the check when the setting of that row has this value.
+template <auto... kPath, class Value>
+Result<void> checked_with(const SettingRange<kPath...>& /*row*/, Value value) {
+  SchedulerSettings settings;
+  (settings.*....*kPath) = value;
+  return check_settings(settings);
+}
+
+TEST(SettingRanges, HoldForEachRowOfTheTable) {
+  const auto hold = [](const auto& row) {
+    SCOPED_TRACE(row.name);
+    using Value = typename std::remove_cvref_t<decltype(row)>::Value;
+    const auto [lowest, highest] = row.in_programs;
+    EXPECT_TRUE(checked_with(row, lowest));
+    EXPECT_TRUE(checked_with(row, highest));
+    EXPECT_TRUE(lowest <= row.in_files.lowest && row.in_files.highest <= highest);
+    for (const Value outside : {lowest - Value(1), highest + Value(1)}) {
+      const auto checked = checked_with(row, outside);
+      ASSERT_FALSE(checked);
+      EXPECT_THAT(checked.error().message, testing::HasSubstr(std::string(row.name)));
+    }
+  };
+  std::apply([&](const auto&... row) { (hold(row), ...); }, kSettingRanges);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Each, Settings,
     testing::Values(
@@ -84,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(
         Setting{"processor_load_maximum", [](SchedulerSettings& s) { s.processor_load_maximum = 101; }},
         Setting{"spin_ahead_max", [](SchedulerSettings& s) { s.spin_ahead_max = Duration(-1); }},
         Setting{"spin_ahead_max",
-                [](SchedulerSettings& s) { s.spin_ahead_max = kSpinAhead.highest + Duration(1); }},
+                [](SchedulerSettings& s) { s.spin_ahead_max = std::chrono::milliseconds(1) + Duration(1); }},
         Setting{"max_event_backlog", [](SchedulerSettings& s) { s.max_event_backlog = 0; }}));
 
 }  // namespace
