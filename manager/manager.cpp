@@ -221,6 +221,7 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
                                        .name = instance.name,
                                        .pool = own.pool,
                                        .run_directory = own.run_directory,
+                                       .objects = &*pool_,
                                        .prepare = [this, name = instance.name] { prepare_files(name); },
                                        .groups = &groups_,
                                        .share = [this, name = instance.name] { return share_of(name); },

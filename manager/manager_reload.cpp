@@ -43,6 +43,7 @@ void Manager::adopt_removed() {
                    name);
     } else {
       end_outputs_of(config_.host.pool, name);
+      pool_->withdraw_events(name);
       wishes_.erase(name);
       transitions_.erase(name);
       remove_kept_settings(name);

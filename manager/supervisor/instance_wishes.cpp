@@ -139,7 +139,7 @@ void ManagedInstance::remove() {
 }
 
 void ManagedInstance::resume() {
-  host_.end_outputs();
+  host_.withdraw();
   if (use_configuration() && earlier_) earlier_->failed = false;
   if (application_ != config_.application) tell_boot_application();
   const EndCause cause = cause_of_beginning();
@@ -173,7 +173,7 @@ std::string ManagedInstance::text_of_beginning(EndCause cause) const {
 void ManagedInstance::ended_unwatched() {
   const auto left = host_.left_runtime();
   const std::string forces = ended_forces_text(left ? left->forces : 0);
-  host_.end_outputs();
+  host_.withdraw();
   start_kind_ = StartKind::after_fault;
   ended({.cause = EndCause::unwatched},
         fmt::format("ended while no manager ran{}{}", forces.empty() ? "" : "; ", forces));

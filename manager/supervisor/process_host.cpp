@@ -15,6 +15,7 @@
 #include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
+#include "shm/pool/object_pool.hpp"
 
 namespace plchost {
 
@@ -184,7 +185,7 @@ bool ProcessHost::end_group() {
 
 // The one place where an instance's exit is reaped. Its last report explains the exit, so it comes first.
 void ProcessHost::process_ended() {
-  end_outputs();  // first: machines wait for it
+  withdraw();  // first: machines wait for it
   read_reports();
   read_replies();
   end_session(*process_);
@@ -272,8 +273,9 @@ bool ProcessHost::can_be_debugged() const {
   return ::access(MemoryFile::path(debug_page_name(settings_.pool, settings_.name)).c_str(), F_OK) == 0;
 }
 
-void ProcessHost::end_outputs() {
+void ProcessHost::withdraw() {
   end_outputs_of(settings_.pool, settings_.name);
+  settings_.objects->withdraw_events(settings_.name);
   DebugPage::remove(settings_.pool, settings_.name);  // nothing halts there any more
 }
 

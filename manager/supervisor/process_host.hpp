@@ -16,6 +16,8 @@
 
 namespace plchost {
 
+class ObjectPool;
+
 /// The real InstanceHost: one instance's process, with its pidfd, report channel and control socket, in the
 /// Reactor. Every exit is reaped in one place, after the manager has read the last messages of the process.
 class ProcessHost : public InstanceHost {
@@ -30,6 +32,7 @@ class ProcessHost : public InstanceHost {
     std::string name;
     std::string pool;
     std::string run_directory;
+    const ObjectPool* objects;  ///< of that pool
     /// Before each start of a process; may be empty.
     std::function<void()> prepare = {};
     /// The control groups of the host; none: its processes stay in that of the manager.
@@ -58,7 +61,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] std::vector<int> granted_cores() override;
   [[nodiscard]] std::string keep_lost_faults() override;
   [[nodiscard]] bool can_be_debugged() const override;
-  void end_outputs() override;
+  void withdraw() override;
   void read_output() override;
   [[nodiscard]] std::string last_line() const override { return output_.last_line(); }
   [[nodiscard]] bool has_met_pids_max() const override;

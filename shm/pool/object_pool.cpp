@@ -440,6 +440,10 @@ Result<void> ObjectPool::look_in_parts(Look look, Take take) const {
   return {};
 }
 
+void ObjectPool::withdraw_events(std::string_view instance) const noexcept {
+  plchost::withdraw_events(segment_->view(), instance);
+}
+
 // First the table of references, then the objects.
 Result<std::vector<ObjectInfo>> ObjectPool::list() const {
   constexpr std::size_t kReferences = 4096;

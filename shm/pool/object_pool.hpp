@@ -153,6 +153,10 @@ class ObjectPool {
   /// Keeps the object no longer: it goes now, or with its last reference. not_found, refused.
   [[nodiscard]] Result<void> remove_object(std::string_view name);
 
+  /// Of an instance whose process is gone: its events are registered no more, and no task takes posts to
+  /// them. Else posters would be told that a task runs what nobody runs. Takes no lock. Any context.
+  void withdraw_events(std::string_view instance) const noexcept;
+
   /// All objects that are in use: referenced, kept, registered or bound. Unordered.
   /// timed_out, corrupt: the pool cannot be locked.
   [[nodiscard]] Result<std::vector<ObjectInfo>> list() const;

@@ -1,6 +1,8 @@
 #include "shm/pool/pool_event.hpp"
 
 #include "shm/pool/pool_layout.hpp"
+#include "shm/pool/pool_table.hpp"
+#include "shm/pool/pool_view.hpp"
 
 namespace plchost {
 
@@ -53,6 +55,20 @@ bool PoolEvent::set_bound_tasks(std::uint32_t count) const noexcept {
 
 bool PoolEvent::hold_for_tasks(std::uint32_t count) const noexcept {
   return change_binding(Binding::kBoundMask, count & Binding::kBoundMask);
+}
+
+// The handle is made before the name is read: if the place is given to another object meanwhile, it is not
+// valid any more and changes nothing.
+void withdraw_events(const PoolView& view, std::string_view owner) noexcept {
+  for (ObjectEntry& entry : view.used_entries()) {
+    const PoolEvent event(entry);
+    if (!PoolTable::is_valid(entry)) continue;
+    if (entry.type.load(kRelaxed) != static_cast<std::uint32_t>(ObjectType::event)) continue;
+    const std::string_view name = entry.name.view();
+    if (!name.starts_with(owner) || name.substr(owner.size(), 1) != "/") continue;
+    (void)event.set_bound_tasks(0);
+    (void)event.set_registered(false);
+  }
 }
 
 CountedEvent& PoolEvent::counted() const noexcept {

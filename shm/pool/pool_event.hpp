@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "shm/base/counted_event.hpp"
 
 namespace plchost {
 
+class PoolView;
 struct ObjectEntry;
 
 /// The effect of a post.
@@ -49,11 +51,15 @@ class PoolEvent {
  private:
   friend class ObjectPool;
   friend class SharedEvent;
+  friend void withdraw_events(const PoolView& view, std::string_view owner) noexcept;
   explicit PoolEvent(ObjectEntry& entry) noexcept;
   bool change_binding(std::uint64_t clear, std::uint64_t set) const noexcept;
 
   ObjectEntry* entry_ = nullptr;
   std::uint32_t generation_ = 0;
 };
+
+/// What ObjectPool::withdraw_events() does.
+void withdraw_events(const PoolView& view, std::string_view owner) noexcept;
 
 }  // namespace plchost

@@ -42,7 +42,7 @@ class FakeHost : public InstanceHost {
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
   [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
   [[nodiscard]] bool can_be_debugged() const override { return debug_build; }
-  void end_outputs() override { ++ended_outputs; }
+  void withdraw() override { ++ended_outputs; }
   void read_output() override {}
   [[nodiscard]] std::string last_line() const override { return said; }
   [[nodiscard]] bool has_met_pids_max() const override { return met_pids_max; }
