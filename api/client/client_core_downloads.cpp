@@ -19,6 +19,14 @@ constexpr Duration kDownloadStall = std::chrono::seconds(10);
 // The host keeps it, tries it and loads it: longer than the server waits for the manager.
 constexpr Duration kDownloadLoad = std::chrono::seconds(130);
 
+/// The end of the wait for a host that has begun to receive. Of one that shows its presence no more, nothing
+/// is to be heard, however long it would take to load.
+TimePoint end_of_wait(const FileSender& sender, const SeenHost* host) {
+  if (!sender.complete()) return sender.last_news() + kDownloadStall;
+  const TimePoint last = host == nullptr ? sender.last_news() : host->server.last();
+  return std::min(sender.last_news() + kDownloadLoad, std::max(sender.last_news(), last) + kDownloadStall);
+}
+
 ApiRequest request_for(const Download& download) {
   ApiRequest request{download.host, plc_OPERATION_DOWNLOAD_APPLICATION, download.instance, download.name};
   const std::string_view text(reinterpret_cast<const char*>(download.contents.data()),
@@ -64,8 +72,8 @@ Async<Result<ApiReply>> ClientCore::download(Download download, DownloadProgress
   const auto go_on = [&](TimePoint now) -> Wait {
     for (const plc_DownloadAck& ack : acks.take()) sender.on_ack(ack, identity, now);
     const bool begun = sender.last_news() != TimePoint{};
-    const Duration patience = sender.complete() ? kDownloadLoad : kDownloadStall;
-    const TimePoint end = begun ? std::max(deadline, sender.last_news() + patience) : deadline;
+    const TimePoint end =
+        begun ? std::max(deadline, end_of_wait(sender, seen_.find(download.host))) : deadline;
     const HostClock* const clock = clock_of(download.host);
     const bool done = sender.complete() || clock == nullptr;
     const TimePoint next =

@@ -1,4 +1,6 @@
 // Files that the client library sends to an instance, and the state of it that it shows.
+#include <chrono>
+#include <csignal>
 #include <fstream>
 #include <future>
 #include <string>
@@ -57,6 +59,22 @@ TEST_F(ClientLibrary, LetsAProgressWaitForOtherCalls) {
   ASSERT_FALSE(answers.empty());
   EXPECT_THAT(answers, testing::Each(std::string("done")));
   EXPECT_TRUE(told.get_future().get());
+}
+
+TEST_F(ClientLibrary, WaitsForAHostThatHasTheFileOnlyWhileItIsThere) {
+  Client sut(options());
+  const std::string file = host_.run_directory() + "/sent.so";
+  std::ofstream(file) << std::string(100'000, 'x');
+  host_.silent = true;
+  const auto progress = [&](unsigned long long bytes) {
+    if (bytes == 100'000) host_.server().signal(SIGKILL);
+  };
+  auto told = std::async(std::launch::async, [&] {
+    return error_of([&] { (void)sut.download_application("hosta", "line1", file, {}, progress); });
+  });
+  constexpr std::chrono::seconds kLoading{100};  // less than a host may take to load
+  ASSERT_EQ(told.wait_for(kLoading), std::future_status::ready);
+  EXPECT_THAT(told.get().what(), HasSubstr("has not said what became of it"));
 }
 
 TEST_F(ClientLibrary, SaysWhichFileItCannotSend) {
