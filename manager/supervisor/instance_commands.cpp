@@ -305,16 +305,19 @@ void ManagedInstance::finish(ErrorCode code, const std::string& text) {
   // Emptied first: the receiver of the reply may ask for the next thing at once.
   const Operation done = std::move(*operation_);
   operation_.reset();
+  const bool holds = done.request.verb == ControlVerb::stop && order() == Order::stop;
+  const std::string refused = holds ? text + "; its next process begins stopped" : text;
   if (code != ErrorCode::ok) {
-    spdlog::warn("instance {}: {} failed: {}", config_.name, to_string(done.request.verb), text);
+    spdlog::warn("instance {}: {} failed: {}", config_.name, to_string(done.request.verb), refused);
   }
   remember();
   const std::string ended = ended_forces_text(std::exchange(ended_forces_, 0));
   if (code == ErrorCode::ok) {
     tell_when_kept(done, text, ended);
   } else {
-    done.reply(ControlReply{
-        .number = done.request.number, .code = code, .text = ended.empty() ? text : text + "; " + ended});
+    done.reply(ControlReply{.number = done.request.number,
+                            .code = code,
+                            .text = ended.empty() ? refused : refused + "; " + ended});
   }
 }
 

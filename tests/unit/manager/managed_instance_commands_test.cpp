@@ -45,7 +45,7 @@ TEST_F(ManagedInstanceTest, PassesOnWhatTheInstanceRefuses) {
   answer(ErrorCode::timed_out, "task Main does not return");
   const auto reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::timed_out);
-  EXPECT_EQ(reply.text, "task Main does not return");
+  EXPECT_EQ(reply.text, "task Main does not return; its next process begins stopped");
   EXPECT_EQ(state(), InstanceState::running);
 }
 
@@ -55,6 +55,18 @@ TEST_F(ManagedInstanceTest, ComesUpStoppedAfterAStopThatFailedUntilItIsStarted) 
   ask(ControlVerb::stop);
   answer(ErrorCode::timed_out, "task Main does not return");
   take_reply();
+  sut().on_exit(killed_by(SIGKILL));
+  expire_timer();
+  EXPECT_TRUE(host_.spawned.back().stopped);
+}
+
+TEST_F(ManagedInstanceTest, TellsThatAStopHoldsWhichDidNotReachItsProcess) {
+  bring_up();
+  host_.can_send = false;
+  ask(ControlVerb::stop);
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::unavailable);
+  EXPECT_THAT(reply.text, HasSubstr("nobody listens; its next process begins stopped"));
   sut().on_exit(killed_by(SIGKILL));
   expire_timer();
   EXPECT_TRUE(host_.spawned.back().stopped);
