@@ -217,15 +217,16 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
   const TrialGroup trial_group(groups_, trial_group_name(own.pool, instance.name),
                                [this, name = instance.name] { return share_of(name).limits; });
   auto host = std::make_unique<ProcessHost>(
-      *reactor_, ProcessHost::Settings{.program = plc_instance,
-                                       .name = instance.name,
-                                       .pool = own.pool,
-                                       .run_directory = own.run_directory,
-                                       .objects = &*pool_,
-                                       .prepare = [this, name = instance.name] { prepare_files(name); },
-                                       .groups = &groups_,
-                                       .share = [this, name = instance.name] { return share_of(name); },
-                                       .trial_group = trial_group});
+      *reactor_,
+      ProcessHost::Settings{.program = plc_instance,
+                            .name = instance.name,
+                            .pool = own.pool,
+                            .run_directory = own.run_directory,
+                            .prepare = [this, name = instance.name] { prepare_files(name); },
+                            .withdraw_events = [this, name = instance.name] { pool_->withdraw_events(name); },
+                            .groups = &groups_,
+                            .share = [this, name = instance.name] { return share_of(name); },
+                            .trial_group = trial_group});
   ProcessHost& made = *host;
   auto applications = std::make_unique<StoreProcess>(
       *reactor_, state_disk_,

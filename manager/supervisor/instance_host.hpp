@@ -54,8 +54,8 @@ class InstanceHost {
   [[nodiscard]] virtual std::string keep_lost_faults() = 0;
   /// The process runs a debug build, and a debugger can halt its tasks.
   [[nodiscard]] virtual bool can_be_debugged() const = 0;
-  /// What a process that has ended has left to others: outputs go into their safe state, its events take no
-  /// posts, and no debugger is shown its tasks any more.
+  /// Takes back all that a process which has ended has shown to others. Its outputs go into their safe state.
+  /// Its events take no posts, and no debugger is shown its tasks any more.
   virtual void withdraw() = 0;
   /// Takes the output of the process into the instance's log. To be called periodically.
   virtual void read_output() = 0;

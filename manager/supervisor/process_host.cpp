@@ -15,7 +15,6 @@
 #include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
-#include "shm/pool/object_pool.hpp"
 
 namespace plchost {
 
@@ -275,7 +274,7 @@ bool ProcessHost::can_be_debugged() const {
 
 void ProcessHost::withdraw() {
   end_outputs_of(settings_.pool, settings_.name);
-  settings_.objects->withdraw_events(settings_.name);
+  settings_.withdraw_events();
   DebugPage::remove(settings_.pool, settings_.name);  // nothing halts there any more
 }
 

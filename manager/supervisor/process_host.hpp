@@ -16,8 +16,6 @@
 
 namespace plchost {
 
-class ObjectPool;
-
 /// The real InstanceHost: one instance's process, with its pidfd, report channel and control socket, in the
 /// Reactor. Every exit is reaped in one place, after the manager has read the last messages of the process.
 class ProcessHost : public InstanceHost {
@@ -32,9 +30,10 @@ class ProcessHost : public InstanceHost {
     std::string name;
     std::string pool;
     std::string run_directory;
-    const ObjectPool* objects;  ///< of that pool
     /// Before each start of a process; may be empty.
     std::function<void()> prepare = {};
+    /// After the end of a process: its events take no posts any more.
+    std::function<void()> withdraw_events;
     /// The control groups of the host; none: its processes stay in that of the manager.
     ControlGroups* groups = nullptr;
     /// Of the next process; may be empty.

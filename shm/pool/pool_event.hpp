@@ -59,7 +59,7 @@ class PoolEvent {
   std::uint32_t generation_ = 0;
 };
 
-/// What ObjectPool::withdraw_events() does.
+/// For ObjectPool::withdraw_events().
 void withdraw_events(const PoolView& view, std::string_view owner) noexcept;
 
 }  // namespace plchost

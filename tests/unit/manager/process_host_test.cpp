@@ -77,12 +77,14 @@ class ProcessHostTest : public ::testing::Test, public InstanceEvents {
                     .name = "line1",
                     .pool = pool_,
                     .run_directory = folder_,
+                    .withdraw_events = [this] { events_withdrawn_ = !end_.exited_with(3); },
                     .groups = &groups_,
                     .share = [] { return ProcessHost::Share{.limits = {}, .oom_score = 300}; },
                     .trial_group = TrialGroup(groups_, trial_group_name(pool_, "line1"),
                                               [this] { return limits_of_trial_; })}};
   GroupLimits limits_of_trial_;
   ExitStatus end_;
+  bool events_withdrawn_ = false;  // before anybody was told of the end
   std::string said_;
   std::string refusal_;  // of an application; empty: it is valid
 };
@@ -98,6 +100,11 @@ TEST_F(ProcessHostTest, KnowsTheEndOfALongLastLine) {
   run("printf '/%0600d: error while loading shared libraries: y: Error 24' 0 >&2; exit 127");
   EXPECT_EQ(said_.size(), InstanceOutput::kLastLine);
   EXPECT_TRUE(said_.ends_with("00: error while loading shared libraries: y: Error 24")) << said_;
+}
+
+TEST_F(ProcessHostTest, WithdrawsTheEventsBeforeItTellsOfTheEnd) {
+  run("exit 3");
+  EXPECT_TRUE(events_withdrawn_);
 }
 
 TEST_F(ProcessHostTest, TakesNoLineOfAnEarlierProcess) {
