@@ -137,8 +137,10 @@ class ClientCore {
   [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
   [[nodiscard]] std::vector<dds_instance_handle_t> late_writers(const std::vector<HostView>& found);
   template <class Cache>
-  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
-                                        std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
+  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic, const dds::Qos& qos,
+                                        std::uint32_t statuses);
+  template <class Cache>
+  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic);
   /// Keeps answers to this client only.
   template <class Answer>
   [[nodiscard]] Result<void> open_own_reader(dds::TopicReader& answers, const dds::Qos& qos);

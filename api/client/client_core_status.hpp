@@ -15,12 +15,18 @@
 namespace plchost {
 
 template <class Cache>
-Result<void> ClientCore::open_cache(Cache& cache, const dds::TopicInfo& info, std::uint32_t statuses) {
+Result<void> ClientCore::open_cache(Cache& cache, const dds::TopicInfo& info, const dds::Qos& qos,
+                                    std::uint32_t statuses) {
   if (cache) return {};
-  PLCHOST_TRY_ASSIGN(auto opened, open_reader(entity(), status_subscriber_.get(), info, dds::shown_qos(info),
-                                              pump_->set(), statuses));
+  PLCHOST_TRY_ASSIGN(auto opened,
+                     open_reader(entity(), status_subscriber_.get(), info, qos, pump_->set(), statuses));
   cache = Cache(std::move(opened));
   return {};
+}
+
+template <class Cache>
+Result<void> ClientCore::open_cache(Cache& cache, const dds::TopicInfo& info) {
+  return open_cache(cache, info, dds::shown_qos(info), DDS_DATA_AVAILABLE_STATUS);
 }
 
 template <class Answer>

@@ -164,7 +164,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
       "<MultipleReceiveThreads>false</MultipleReceiveThreads><NackDelay>1 ms</NackDelay><AckDelay>1 "
       "ms</AckDelay>"
       "<PreEmptiveAckDelay>1 ms</PreEmptiveAckDelay>"
-      "<HeartbeatInterval min=\"1 ms\" minsched=\"5 ms\" max=\"100 ms\">10 ms</HeartbeatInterval>"
+      "<HeartbeatInterval min=\"1 ms\" minsched=\"5 ms\" max=\"1 s\">10 ms</HeartbeatInterval>"
       "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>256 KiB</MaxSampleSize>"
       "<Watermarks><WhcHigh>{}</WhcHigh><WhcHighInit>{}</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
       "</Watermarks></Internal>{}{}{}</Domain></CycloneDDS>",

@@ -7,6 +7,11 @@ Qos& Qos::reliable(Duration max_blocking) {
   return *this;
 }
 
+Qos& Qos::best_effort() {
+  dds_qset_reliability(qos_.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
+  return *this;
+}
+
 Qos& Qos::keep_last(std::int32_t depth) {
   dds_qset_history(qos_.get(), DDS_HISTORY_KEEP_LAST, depth);
   // The history of a transient-local writer for late readers has a bound of its own.

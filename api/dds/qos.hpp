@@ -16,6 +16,7 @@ class Qos {
   Qos() : qos_(dds_create_qos()) {}
 
   Qos& reliable(Duration max_blocking);
+  Qos& best_effort();
   Qos& keep_last(std::int32_t depth);
   Qos& keep_all();
   Qos& transient_local();
