@@ -13,7 +13,8 @@ class SingleCycle::Source final : public ActivationSource {
     if (link.gate.wait(round_.clock_) != ActivationGate::Outcome::opened) return std::nullopt;
     ran_ = true;
     link.begun.store(true, std::memory_order_release);
-    return Activation{.release = TimePoint(Duration(link.released_at.load(std::memory_order_relaxed)))};
+    return Activation{.release = TimePoint(Duration(link.released_at.load(std::memory_order_relaxed))),
+                      .single_cycle = true};
   }
   void interrupt() noexcept override { round_.links_[link_]->gate.interrupt(round_.clock_); }
 

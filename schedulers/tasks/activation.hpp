@@ -18,6 +18,7 @@ struct Activation {
       0;  ///< external events dropped since then, beyond the backlog's bound, or edges beyond what is kept
   Duration spun{};                      ///< time burnt ahead of the release
   std::uint64_t timer_expirations = 0;  ///< how often the task's own kernel timer went off since the last one
+  bool single_cycle = false;            ///< no other release is planned
 };
 
 /// The source that one task waits on; made for that task by the scheduler, or by the task's kind. The only

@@ -64,6 +64,14 @@ class EventLatch {
   }
   /// Edges lost since the last call. The task's thread.
   [[nodiscard]] std::uint64_t take_lost() noexcept { return lost_.exchange(0, std::memory_order_relaxed); }
+  /// Edges lost since the last take_lost(). Any thread.
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_.load(std::memory_order_relaxed); }
+  /// Those lost since lost() was `before` are lost no more; how many they are. The task's thread.
+  [[nodiscard]] std::uint64_t take_lost_since(std::uint64_t before) noexcept {
+    const std::uint64_t since = lost() - before;
+    lost_.fetch_sub(since, std::memory_order_relaxed);
+    return since;
+  }
 
   ActivationGate gate;  ///< opened after runs have become due
 

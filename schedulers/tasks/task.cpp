@@ -99,6 +99,7 @@ void Task::look_at_overrun(Duration execution) noexcept {
 
 void Task::run_cycle(const Activation& activation) noexcept {
   const CycleGate::Stay within(gate_, trap_.seat(), clock_);
+  single_cycle_ = activation.single_cycle;
   state_->cycle_begins(activation.release);
   const TimePoint start = clock_.now();
   tell_start(activation, start);
@@ -137,7 +138,10 @@ void Task::stand_still(const std::function<void()>& wait) noexcept {
   const TimePoint from = clock_.now();
   flight_.put(from, FlightKind::halted);
   const TimePoint start = trap_.seat().stands_still();
+  EventLatch* const latch = state_->latch();
+  if (latch != nullptr) lost_before_ = latch->lost();
   wait();
+  if (latch != nullptr) count_passed(latch->take_lost_since(lost_before_));
   const TimePoint to = clock_.now();
   flight_.put(to, FlightKind::resumed);
   stood_still_ += to - from;
@@ -147,8 +151,17 @@ void Task::stand_still(const std::function<void()>& wait) noexcept {
 }
 
 void Task::pass_over(TimePoint end, Duration still) noexcept {
-  passed_.store(passed_.load(std::memory_order_relaxed) + state_->pass_over(end, still),
-                std::memory_order_relaxed);
+  if (!single_cycle_) count_passed(state_->pass_over(end, still));
+}
+
+void Task::count_passed(std::uint64_t releases) noexcept {
+  passed_.store(passed_.load(std::memory_order_relaxed) + releases, std::memory_order_relaxed);
+}
+
+std::uint64_t Task::releases_passing(Duration still) const noexcept {
+  if (const EventLatch* const latch = state_->latch()) return latch->lost() - lost_before_;
+  const Duration interval = single_cycle_ ? Duration() : interval_in_force();
+  return interval > Duration() ? static_cast<std::uint64_t>(still / interval) : 0;
 }
 
 void Task::work_between_cycles() noexcept {

@@ -71,10 +71,14 @@ class Task {
   /// a cycle. No watchdog counts that time, the task is in no cycle for between_cycles(), and the cycle's
   /// execution time is without it. The task's thread, within its code.
   void stand_still(const std::function<void()>& wait) noexcept;
-  /// The releases of cyclic tasks that passed in cycles that stood still: they are no lost ones. Any thread.
+  /// The releases that passed in cycles that stood still: they are no lost ones. Those of event tasks are the
+  /// edges for which no run is kept. Any thread.
   [[nodiscard]] std::uint64_t releases_passed() const noexcept {
     return passed_.load(std::memory_order_relaxed);
   }
+  /// Those that releases_passed() does not count yet, of a cycle that has stood still for so long. Only while
+  /// `wait` of stand_still() runs.
+  [[nodiscard]] std::uint64_t releases_passing(Duration still) const noexcept;
   /// The next cycle is the first from another source. The task's thread.
   void source_changed() noexcept { overruns_.forgive_next(); }
 
@@ -139,6 +143,7 @@ class Task {
   void work_between_cycles() noexcept;
   void record(const Activation& activation, TimePoint start, TimePoint end, TimePoint ready) noexcept;
   void pass_over(TimePoint end, Duration still) noexcept;
+  void count_passed(std::uint64_t releases) noexcept;
 
   Clock& clock_;
   TaskConfig config_;
@@ -155,7 +160,9 @@ class Task {
   std::atomic<std::uint64_t> lost_{0};  // these two: one writer, the task's thread
   std::atomic<std::uint64_t> on_time_{0};
   std::atomic<std::uint64_t> passed_{0};
-  Duration stood_still_{};  // these two: the task's thread, in this cycle
+  Duration stood_still_{};         // these four: the task's thread, in this cycle
+  bool single_cycle_ = false;      // no other release is planned
+  std::uint64_t lost_before_ = 0;  // edges, when it began to stand still
   FlightRing flight_;
 };
 

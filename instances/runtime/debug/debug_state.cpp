@@ -110,11 +110,9 @@ nlohmann::json DebugService::state_of_task(std::size_t number, StackDetail detai
     one["halts"] = task.halts();
     const Duration going_on = halt ? time_of(*halt) : Duration();
     one["halted_ms"] = (task.halted_for() + going_on) / std::chrono::milliseconds(1);
-    // The task itself counts the releases at the end of the cycle.
-    const Duration interval = halt ? task.task().interval_in_force() : Duration();
-    const std::uint64_t passed =
-        interval > Duration() ? static_cast<std::uint64_t>((halt->before + going_on) / interval) : 0;
-    one["releases_halted"] = task.task().releases_passed() + passed;
+    // The task itself counts these later.
+    const std::uint64_t passing = halt ? task.task().releases_passing(halt->before + going_on) : 0;
+    one["releases_halted"] = task.task().releases_passed() + passing;
   }
   if (!halt) return one;
   one["halt"] = halt->number;

@@ -42,6 +42,22 @@ TEST_F(EventLatchTest, KeepsOneRunAndCountsFurtherEdgesAsLost) {
   EXPECT_FALSE(take());
 }
 
+TEST_F(EventLatchTest, TakesBackTheEdgesThatWereLostSince) {
+  const auto edges = [this](int count) {
+    for (int i = 0; i < count; ++i) {
+      poll(true);
+      poll(false);
+    }
+  };
+  edges(3);
+  const auto before = sut.lost();
+  EXPECT_EQ(before, 2U);
+  EXPECT_EQ(sut.take_lost_since(before), 0U);
+  edges(4);
+  EXPECT_EQ(sut.take_lost_since(before), 4U);
+  EXPECT_EQ(sut.take_lost(), 2U);
+}
+
 TEST_F(EventLatchTest, EdgeDuringARunIsKeptForTheNext) {
   poll(true);
   EXPECT_TRUE(take());

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "schedulers/activation/single_cycle.hpp"
+#include "schedulers/tasks/event_latch.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace plchost {
@@ -353,6 +355,63 @@ TEST_F(TaskTest, LosesTheReleasesOfItsOwnTimeAlsoInACycleThatStoodStill) {
   run_next(sut, Duration::zero());
   EXPECT_EQ(sut.releases_passed(), 2U);
   EXPECT_EQ(sut.next_release(FreewheelRule({})).lost_cycles, 4U) << "six lie within its 65 ms";
+}
+
+// In a single cycle of a stopped application no other release is planned.
+TEST_F(TaskTest, PassesNoReleasesInASingleCycleThatStoodStill) {
+  TaskConfig config = cyclic();
+  Task* task = nullptr;
+  std::uint64_t passing = 0;
+  config.entry = [&] {
+    task->stand_still([&] {
+      clock.run_for(milliseconds(75));
+      passing = task->releases_passing(milliseconds(75));
+    });
+  };
+  Task sut(clock, config, statistics, nullptr);
+  task = &sut;
+  sut.begin(clock.now());
+  SingleCycle round(clock);
+  const auto source = round.add();
+  round.begin();
+  sut.run_cycle(source->wait().value());
+  EXPECT_EQ(passing, 0U);
+  EXPECT_EQ(sut.releases_passed(), 0U);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(passing, 7U);
+  EXPECT_EQ(sut.releases_passed(), 7U);
+}
+
+// Before the halt, in it and behind it: only those of the halt are told as passed.
+TEST_F(TaskTest, LosesNoEdgesThatRiseWhileItStandsStill) {
+  TaskConfig config;
+  config.kind = TaskKind::event;
+  Task* task = nullptr;
+  std::uint64_t passing = 0;
+  const auto edges = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      task->latch()->poll(clock, true, clock.now());
+      task->latch()->poll(clock, false, clock.now());
+    }
+  };
+  config.entry = [&] {
+    edges(3);  // one run is kept
+    task->stand_still([&] {
+      edges(5);
+      passing = task->releases_passing(milliseconds(75));
+    });
+    edges(1);
+  };
+  Task sut(clock, config, statistics, nullptr);
+  task = &sut;
+  edges(1);
+  EXPECT_TRUE(sut.latch()->take());
+  sut.run_cycle({.release = clock.now()});
+  EXPECT_EQ(passing, 5U);
+  EXPECT_EQ(sut.releases_passed(), 5U);
+  EXPECT_TRUE(sut.latch()->take());
+  EXPECT_EQ(sut.latch()->take_lost(), 3U);
 }
 
 }  // namespace
