@@ -247,6 +247,25 @@ TEST_F(DebuggingByHand, TellsTheTimeOfAHaltThatGoesOn) {
   EXPECT_EQ(task("Main").value("halts", 0), 1);
 }
 
+// No release is planned while the application is stopped.
+TEST_F(DebuggingByHand, PassesNoReleasesInASingleCycle) {
+  attach();
+  command("break Main:24");
+  ASSERT_TRUE(halts("Main"));
+  ASSERT_EQ(process_->ask(ControlVerb::stop).code, ErrorCode::ok);
+  ControlReply done;
+  {
+    const std::jthread asking([&] { done = process_->ask(ControlVerb::single_cycle); });
+    EXPECT_TRUE(halts("Main"));
+    const json before = task("Main");
+    EXPECT_TRUE(
+        eventually([&] { return task("Main").value("halted_ms", 0) >= before.value("halted_ms", 0) + 300; }));
+    EXPECT_EQ(task("Main").value("releases_halted", 0), before.value("releases_halted", 0));
+    command("continue Main");
+  }
+  EXPECT_EQ(done.code, ErrorCode::ok) << done.text;
+}
+
 TEST_F(DebuggingByHand, HaltsAllTasksIfItIsSaid) {
   attach();
   command("halts all");
