@@ -101,6 +101,7 @@ std::string toml_advice(std::string_view line, std::string_view parsers_words) {
     const std::string key = shown(trim(line.substr(0, line.find('='))));
     return fmt::format("{} is given twice; remove one of them", key);
   }
+  if (parsers_words.contains("maximum nested value depth")) return "a list or table is nested too deep";
   if (std::string advice = advice_for(trim(line)); !advice.empty()) return advice;
   return printable(std::string(parsers_words));
 }

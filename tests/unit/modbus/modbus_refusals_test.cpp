@@ -1,3 +1,5 @@
+#include <string>
+
 #include <gmock/gmock.h>
 
 #include "tests/unit/modbus/parsed_text.hpp"
@@ -6,6 +8,7 @@ namespace plchost::modbus {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 struct Refusal {
   const char* text;  ///< behind the images
@@ -16,6 +19,12 @@ class RefusedModbusConfig : public ::testing::TestWithParam<Refusal> {};
 TEST_P(RefusedModbusConfig, SaysWhatIsAllowed) {
   EXPECT_THAT(refused(GetParam().text), HasSubstr(GetParam().error));
 }
+
+// A list in a list, 300 times.
+const char* const kDeep = [] {
+  static const std::string text = "a = " + std::string(300, '[') + std::string(300, ']') + "\n";
+  return text.c_str();
+}();
 
 #define DEVICE "[[device]]\nname = \"d\"\ntcp = \"127.0.0.1\"\n"
 #define READ "[[device.read]]\naddress = 0\nimage = \"t.in\"\n"
@@ -44,7 +53,19 @@ const Refusal kRefusals[] = {
      "1300 is no speed; allowed are 1200, 2400"},
     {"[[device]]\nname = \"d\"\nserial = \"ttyS0\"\n" READ "kind = \"coil\"\n", "is no path"},
     {DEVICE "tcp_port = 502\n" READ "kind = \"coil\"\n", "unknown key 'tcp_port'"},
-    {DEVICE "reconnect_ms = 500\nreconnect_max_ms = 400\n" READ "kind = \"coil\"\n", "is below reconnect_ms"},
+    {DEVICE "reconnect_ms = 500\nreconnect_max_ms = 400\n" READ "kind = \"coil\"\n",
+     "m.toml:13:1: [[device]] 'd' reconnect_max_ms: 400 is below reconnect_ms, which is 500; allowed is that "
+     "or "
+     "more"},
+    {DEVICE "reconnect_ms = 20000\n" READ "kind = \"coil\"\n",
+     "m.toml:12:1: [[device]] 'd' reconnect_ms: 20000 is above reconnect_max_ms, which is 10000 by default"},
+    {DEVICE "poll_ms = 300\ngone_after_ms = 300\n" READ "kind = \"coil\"\n",
+     "m.toml:13:1: [[device]] 'd' gone_after_ms: 300 is not above poll_ms, which is 300; allowed is more "
+     "than"},
+    {DEVICE "gone_after_ms = 100\n" READ "kind = \"coil\"\n",
+     "m.toml:12:1: [[device]] 'd' gone_after_ms: 100 is not above poll_ms, which is 100 by default"},
+    {DEVICE "when_gone = \"zero\"\npoll_ms = 1000\n" READ "kind = \"coil\"\n",
+     "m.toml:13:1: [[device]] 'd' poll_ms: 1000 is not below gone_after_ms, which is 1000 by default"},
     {DEVICE "status_offset = 4\n" READ "kind = \"coil\"\n", "status_offset: needs status_image"},
     {DEVICE "status_image = \"t.in\"\nstatus_offset = 57\n" READ "kind = \"coil\"\n",
      "the status has 8 bytes, and image 't.in' has 64"},
@@ -65,7 +86,7 @@ const Refusal kRefusals[] = {
      "'t.out' is an output image, which the PLC writes"},
     {DEVICE "[[device.write]]\nkind = \"coil\"\naddress = 0\nimage = \"t.in\"\n", "'t.in' is an input image"},
     {MEMORY DEVICE "[[device.read]]\nkind = \"coil\"\naddress = 0\nimage = \"line1\"\n",
-     "'line1' is a memory area"},
+     "'line1' is a memory area; allowed is an image with direction = \"input\""},
     {MEMORY DEVICE "[[device.write]]\nkind = \"coil\"\naddress = 0\nimage = \"line1\"\n",
      "'line1' is a memory area"},
     {MEMORY SERVER "kind = \"input_register\"\nimage = \"line1\"\nwritable = true\n",
@@ -91,7 +112,44 @@ const Refusal kRefusals[] = {
     {"[server]\nconnections = 65\n[[server.map]]\naddress = 0\nkind = \"coil\"\nimage = \"t.in\"\n",
      "65 is out of range; allowed is 1 to 64"},
     {DEVICE "[[device.read]]\nkind = coil\n", "put texts in quotes"},
+    {kDeep, "nested too deep"},
 };
+// A value that was refused has no other errors.
+TEST(ModbusRefusals, AWrongValueIsToldOnce) {
+  const std::string image = "[[image]]\nname = \"big\"\ndirection = \"input\"\n";
+  const std::string maps = "[[device.read]]\nkind = \"coil\"\naddress = 0\nimage = \"big\"\n";
+  for (const char* const size : {"size = 0\n", "size = 1048577\n", ""}) {
+    const std::string told =
+        refused(image + size + DEVICE "status_image = \"big\"\nstatus_offset = 8\n" + maps);
+    EXPECT_THAT(told, HasSubstr("[[image]] 'big' size: "));
+    EXPECT_THAT(told, Not(HasSubstr("\n")));
+  }
+  const std::string other = "[[image]]\nname = \"big\"\ndirection = \"outputs\"\nsize = 64\n";
+  const std::string writes = "[[device.write]]\nkind = \"coil\"\naddress = 0\nimage = \"big\"\n";
+  EXPECT_THAT(refused(other + DEVICE + writes), Not(HasSubstr("\n")));
+  EXPECT_THAT(refused(other + DEVICE "status_image = \"big\"\n" READ "kind = \"coil\"\n"),
+              Not(HasSubstr("\n")));
+  EXPECT_THAT(refused(DEVICE "reconnect_ms = 50\nreconnect_max_ms = 400\n" READ "kind = \"coil\"\n"),
+              Not(HasSubstr("\n")));
+  EXPECT_THAT(refused(DEVICE "poll_ms = 0\ngone_after_ms = 50\n" READ "kind = \"coil\"\n"),
+              Not(HasSubstr("\n")));
+}
+
+TEST(ModbusRefusals, AnImageWithoutANameIsNoneOfThoseThatThereAre) {
+  const std::string told = refused("[[image]]\nname = \"\"\ndirection = \"input\"\nsize = 8\n" DEVICE
+                                   "[[device.read]]\nkind = \"coil\"\naddress = 0\nimage = \"x\"\n");
+  EXPECT_THAT(told, HasSubstr("there is no [[image]] 'x'; there are t.in, t.out"));
+  const auto none = parse_modbus_config(DEVICE READ "kind = \"coil\"\n", "m.toml");
+  ASSERT_FALSE(none.has_value());
+  EXPECT_THAT(none.error().front(), HasSubstr("there is no [[image]] 't.in'; there are none"));
+}
+
+// Neither key has a meaning then.
+TEST(ModbusRefusals, ADefaultThatIsNotUsedRefusesNothing) {
+  EXPECT_EQ(refused(DEVICE "poll_ms = 5000\n" READ "kind = \"coil\"\n"), "accepted");
+  EXPECT_EQ(refused(DEVICE "when_gone = \"zero\"\npoll_ms = 5000\n" WRITE "kind = \"coil\"\n"), "accepted");
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, RefusedModbusConfig, ::testing::ValuesIn(kRefusals));
 
 }  // namespace

@@ -70,8 +70,9 @@ void check_direction(SectionReader& reader, const ImageConfig& image, const Regi
     reader.problem("image", fmt::format("'{}' is {}{}; allowed is an image with direction = {}",
                                         shown(image.name), name_of(image.direction), why, allowed));
   };
+  if (image.direction_line == 0) return;  // it was wrong
   if (use == MapUse::device_read && image.direction != ImageDirection::input) {
-    refuse(", which the PLC writes", "\"input\"");
+    refuse(image.direction == ImageDirection::output ? ", which the PLC writes" : "", "\"input\"");
   } else if (use == MapUse::device_write && image.direction != ImageDirection::output) {
     refuse("", "\"output\"");
   } else if (map.writable && image.direction == ImageDirection::output) {
@@ -87,9 +88,11 @@ const ImageConfig* find_image(SectionReader& reader, std::string_view key,
   if (found != images.end()) return &*found;
   std::vector<std::string_view> names;
   names.reserve(images.size());
-  for (const ImageConfig& image : images) names.push_back(image.name);
+  for (const ImageConfig& image : images) {
+    if (!image.name.empty()) names.push_back(image.name);  // it was wrong
+  }
   reader.problem(key, fmt::format("there is no [[image]] '{}'; there are {}{}", shown(name),
-                                  join_names(names), suggestion(name, names)));
+                                  names.empty() ? "none" : join_names(names), suggestion(name, names)));
   return nullptr;
 }
 
@@ -101,7 +104,7 @@ void check_map(SectionReader& reader, const std::vector<ImageConfig>& images, co
   const ImageConfig* const image = find_image(reader, "image", images, map.image);
   if (image == nullptr) return;
   check_direction(reader, *image, map, use);
-  if (reader.wrong("kind") || reader.wrong("count")) return;
+  if (reader.wrong("kind") || reader.wrong("count") || image->size == 0) return;  // it was wrong
   const std::uint64_t end = first_bit(map) + size_in_bits(map);
   if (end > std::uint64_t{image->size} * 8) {
     reader.problem("offset", fmt::format("the map ends at byte {}, and image '{}' has {}", (end + 7) / 8,

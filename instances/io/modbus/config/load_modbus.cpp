@@ -74,6 +74,7 @@ class Loader {
                   image.line = line;
                   SectionReader reader = reader_of(table, line, name_of("[[image]]", table, index));
                   read_keys(image_keys(), ModbusReading{}, reader, image);
+                  if (!reader.wrong("direction")) image.direction_line = reader.line_of("direction");
                   if (image.name.empty() && !reader.wrong("name")) reader.problem("name", "is empty");
                   config_.images.push_back(std::move(image));
                 });
@@ -133,7 +134,7 @@ class Loader {
     // One name for each line: devices of one line take turns.
     device.serial = std::filesystem::path(device.serial).lexically_normal().string();
     check_way(reader, device);
-    check_device(reader, device);
+    check_device(reader, device, table.contains("read"));
     read_maps(table, "read", where + " [[device.read]]", MapUse::device_read, device.reads);
     read_maps(table, "write", where + " [[device.write]]", MapUse::device_write, device.writes);
     if (!table.contains("read") && !table.contains("write")) {
@@ -184,10 +185,47 @@ class Loader {
                                          int{device.unit}, int{kLastSerialUnit}));
     }
   }
-  void check_device(SectionReader& reader, const DeviceConfig& device) {
-    if (device.reconnect_max < device.reconnect) {
-      reader.problem("reconnect_max_ms", "is below reconnect_ms; allowed is that or more");
+  static std::int64_t in_ms(Duration time) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(time).count();
+  }
+  static std::string_view by_default(const SectionReader& reader, std::string_view key) {
+    return reader.has(key) ? "" : " by default";
+  }
+  static void check_pauses(SectionReader& reader, const DeviceConfig& device) {
+    if (reader.wrong("reconnect_ms") || reader.wrong("reconnect_max_ms")) return;
+    if (device.reconnect_max >= device.reconnect) return;
+    const auto least = in_ms(device.reconnect);
+    const auto most = in_ms(device.reconnect_max);
+    if (reader.has("reconnect_max_ms")) {
+      return reader.problem("reconnect_max_ms",
+                            fmt::format("{} is below reconnect_ms, which is {}{}; allowed is that or more",
+                                        most, least, by_default(reader, "reconnect_ms")));
     }
+    reader.problem("reconnect_ms", fmt::format("{} is above reconnect_max_ms, which is {} by default; set "
+                                               "reconnect_max_ms, or a shorter reconnect_ms",
+                                               least, most));
+  }
+  // A default has no meaning if nothing becomes zero.
+  static void check_age(SectionReader& reader, const DeviceConfig& device, bool has_reads) {
+    if (reader.wrong("poll_ms") || reader.wrong("gone_after_ms") || reader.wrong("when_gone")) return;
+    if (device.gone_after > device.poll) return;
+    const auto age = in_ms(device.gone_after);
+    const auto poll = in_ms(device.poll);
+    if (reader.has("gone_after_ms")) {
+      return reader.problem(
+          "gone_after_ms",
+          fmt::format("{} is not above poll_ms, which is {}{}; allowed is more than the time "
+                      "of two polls",
+                      age, poll, by_default(reader, "poll_ms")));
+    }
+    if (!has_reads || device.when_gone != LossPolicy::zero) return;
+    reader.problem("poll_ms", fmt::format("{} is not below gone_after_ms, which is {} by default; set "
+                                          "gone_after_ms to more than the time of two polls",
+                                          poll, age));
+  }
+  void check_device(SectionReader& reader, const DeviceConfig& device, bool has_reads) {
+    check_pauses(reader, device);
+    check_age(reader, device, has_reads);
     if (device.status_image.empty()) {
       if (reader.has("status_offset")) reader.problem("status_offset", "needs status_image");
       return;
@@ -195,10 +233,10 @@ class Loader {
     if (reader.wrong("status_image")) return;
     const ImageConfig* const image = find_image(reader, "status_image", config_.images, device.status_image);
     if (image == nullptr) return;
-    if (image->direction != ImageDirection::input) {
+    if (image->direction_line != 0 && image->direction != ImageDirection::input) {
       reader.problem("status_image", "is no input image; allowed is an image with direction = \"input\"");
     }
-    if (device.status_offset + sizeof(DeviceStatus) > image->size) {
+    if (image->size != 0 && device.status_offset + sizeof(DeviceStatus) > image->size) {
       reader.problem("status_offset", fmt::format("the status has {} bytes, and image '{}' has {}",
                                                   sizeof(DeviceStatus), shown(image->name), image->size));
     }

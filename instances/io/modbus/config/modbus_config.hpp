@@ -53,8 +53,9 @@ struct ProcessConfig {
 struct ImageConfig {
   std::string name;
   ImageDirection direction = ImageDirection::input;
-  std::uint32_t size = 0;
+  std::uint32_t size = 0;  ///< 0: it was refused
   unsigned line = 0;
+  unsigned direction_line = 0;  ///< 0: it was refused
 };
 
 /// One [[device.read]], [[device.write]] or [[server.map]]: a run of registers or bits and its place.

@@ -251,7 +251,7 @@ constexpr std::array kServerMapKeys = {
 
 // Beside the keys: the line, and the tables below a section.
 static_assert(kProcessKeys.size() == count_members<ProcessConfig>(), "each key of [modbus] has its row");
-static_assert(kImageKeys.size() + 1 == count_members<ImageConfig>(), "each key of [[image]] has its row");
+static_assert(kImageKeys.size() + 2 == count_members<ImageConfig>(), "each key of [[image]] has its row");
 static_assert(kDeviceKeys.size() + 3 == count_members<DeviceConfig>(), "each key of [[device]] has its row");
 static_assert(kServerKeys.size() + 2 == count_members<ServerConfig>(), "each key of [server] has its row");
 static_assert(kMapKeys.size() + kReadMapKeys.size() + kWriteMapKeys.size() + kServerMapKeys.size() + 1 ==
