@@ -4,7 +4,9 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <expected>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -15,6 +17,7 @@
 #include <unistd.h>
 
 #include "instances/io/modbus/config/load_modbus.hpp"
+#include "instances/io/modbus/images/check_memories.hpp"
 #include "instances/io/modbus/modbus_process.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
@@ -69,8 +72,16 @@ Result<UniqueFd> hold_alone(const std::string& file) {
                  fmt::format("{}: another plchost-modbus runs with this file; end that one first", file));
 }
 
+std::expected<ModbusConfig, ConfigErrors> load(const std::string& file) {
+  auto config = load_modbus_config(file);
+  if (!config) return config;
+  ConfigErrors errors = check_memories(*config, file);
+  if (!errors.empty()) return std::unexpected(std::move(errors));
+  return config;
+}
+
 int check_only(const std::string& file) {
-  const auto config = load_modbus_config(file);
+  const auto config = load(file);
   if (config) {
     fmt::print("{}: ok, {}, {}{}\n", file, count_text(config->devices.size(), "device"),
                count_text(config->images.size(), "image"), config->server ? ", a server" : "");
@@ -81,7 +92,7 @@ int check_only(const std::string& file) {
 }
 
 int run(const Options& options) {
-  const auto config = load_modbus_config(options.config);
+  const auto config = load(options.config);
   if (!config) {
     for (const std::string& error : config.error()) fmt::print(stderr, "{}\n", error);
     return EXIT_FAILURE;

@@ -4,11 +4,13 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <arpa/inet.h>
@@ -178,6 +180,100 @@ TEST(ModbusServer, ShowsAMemoryAreaWhileItIsThere) {
   EXPECT_TRUE(shows({1, 0, 0, 0, 0, 2}));
   EXPECT_EQ(client.write(0, 3), -2);
   MemoryFile::remove(name);
+}
+
+// Registers and coils that are as long as the header of an image.
+std::string memory_server(const HeldPort& port, std::string_view name) {
+  return fmt::format(
+      "[[image]]\nname = \"{}\"\ndirection = \"memory\"\nsize = 128\n[server]\nlisten = \"{}\"\n"
+      "[[server.map]]\nkind = \"holding_register\"\naddress = 0\ncount = 60\nimage = \"{}\"\nwritable = "
+      "true\n"
+      "[[server.map]]\nkind = \"coil\"\naddress = 0\ncount = 64\noffset = 120\nimage = \"{}\"\nwritable = "
+      "true\n",
+      name, port.address(), name, name);
+}
+
+// The output and the exit code of --check-config.
+std::pair<std::string, int> checked(const std::string& config) {
+  std::string text;
+  std::FILE* const program = ::popen((PLCHOST_MODBUS_PROGRAM " --check-config " + config).c_str(), "r");
+  for (int letter = 0; (letter = std::fgetc(program)) != EOF;) text += static_cast<char>(letter);
+  return {text, ::pclose(program)};
+}
+
+TEST(ModbusServer, AProcessImageIsRefusedAsAMemoryArea) {
+  Plant plant;
+  const HeldPort port;
+  const std::string config = plant.write(memory_server(port, "sv.out"));
+  EXPECT_EQ(checked(config).second, 0) << "there is none yet: " << checked(config).first;
+  plc_image image{};
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "sv.out", 64, PLC_IMAGE_WRITE, &image), 0);
+  const std::string error = config +
+                            ":13: [[image]] 'sv.out' direction: \"memory\" is for other areas, and " +
+                            fmt::format("'sv.out' of pool '{}' is a process image", plant.pool());
+  const auto [text, code] = checked(config);
+  EXPECT_NE(code, 0);
+  EXPECT_THAT(text, ::testing::HasSubstr(error));
+  ModbusProgram sut(plant, config);
+  EXPECT_EQ(sut.end(), 1);
+  EXPECT_TRUE(sut.logged(error)) << sut.log();
+  plc_image_close(&image);
+}
+
+/// Each client's write is refused, and nothing of an image is read or has changed.
+void expect_refused(const Client& client, const plc_image& image) {
+  const plc_image_header before = *image.header;
+  EXPECT_EQ(client.holding(0, 1), std::vector{-4});
+  for (int address = 0; address < 60; ++address) EXPECT_EQ(client.write(address, 0x0102), -4) << address;
+  EXPECT_EQ(modbus_write_bit(client.context(), 3, 1), -1);
+  EXPECT_EQ(Client::exception(), -4);
+  EXPECT_EQ(std::memcmp(&before, image.header, sizeof before), 0);
+}
+
+// An instance starts later, with the name of a memory area for its outputs.
+TEST(ModbusServer, AProcessImageThatReplacesAMemoryAreaIsNotTouched) {
+  Plant plant;
+  const HeldPort port;
+  const ModbusProgram sut(plant, plant.write(memory_server(port, "line1")));
+  const Client client(port);
+  ASSERT_TRUE(client.connected()) << sut.log();
+  EXPECT_EQ(client.holding(0, 1), std::vector{-4}) << "it is not there";
+  const std::string name = pool_memory_name(plant.pool(), "line1");
+  plc_image image{};
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "line1", 64, PLC_IMAGE_WRITE, &image), 0);
+  expect_refused(client, image);
+  EXPECT_TRUE(sut.logged("memory 'line1' of pool '" + plant.pool() + "' is not shown: it is a process image"))
+      << sut.log();
+  plc_image_close(&image);
+  MemoryFile::remove(name);
+  {
+    const MemoryFile memory = MemoryFile::create(name, 128).value();
+    EXPECT_TRUE(eventually([&] { return client.write(8, 3) == 0; })) << sut.log();
+    EXPECT_EQ(client.holding(8, 1), std::vector{3});
+  }
+  MemoryFile::remove(name);
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "line1", 64, PLC_IMAGE_WRITE, &image), 0);
+  EXPECT_TRUE(eventually([&] { return client.holding(0, 1) == std::vector{-4}; })) << sut.log();
+  expect_refused(client, image);
+  plc_image_close(&image);
+}
+
+// A memory of zeros that has the size of an image becomes one where it lies.
+TEST(ModbusServer, AMemoryAreaThatBecomesAProcessImageIsNotTouched) {
+  Plant plant;
+  const HeldPort port;
+  const MemoryFile memory =
+      MemoryFile::create(pool_memory_name(plant.pool(), "line1"), plc_image_bytes(64)).value();
+  const ModbusProgram sut(plant, plant.write(memory_server(port, "line1")));
+  const Client client(port);
+  ASSERT_TRUE(client.connected()) << sut.log();
+  EXPECT_EQ(client.write(59, 3), 0);
+  EXPECT_EQ(client.holding(59, 1), std::vector{3});
+  plc_image image{};
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "line1", 64, PLC_IMAGE_WRITE, &image), 0);
+  expect_refused(client, image);
+  EXPECT_TRUE(sut.logged("it is a process image")) << sut.log();
+  plc_image_close(&image);
 }
 
 // As a C program and firmware, which know no cycle of each other: this thread writes what lies between.

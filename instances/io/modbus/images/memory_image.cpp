@@ -7,6 +7,7 @@
 #include "instances/io/modbus/config/map_values.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
+#include "shm/plc_process_image.h"
 
 namespace plchost::modbus {
 
@@ -27,6 +28,13 @@ void copy(std::span<const std::byte> from, std::span<std::byte> to) noexcept {
     to[at] = static_cast<std::byte>(
         __atomic_load_n(reinterpret_cast<const std::uint8_t*>(from.data() + at), __ATOMIC_RELAXED));
   }
+}
+
+// Of any version and size: others read and write it by its header.
+bool begins_as_image(std::span<const std::byte> bytes) noexcept {
+  if (bytes.size() < sizeof(plc_image_header)) return false;
+  const auto* const header = reinterpret_cast<const plc_image_header*>(bytes.data());
+  return __atomic_load_n(&header->magic, __ATOMIC_ACQUIRE) == PLC_IMAGE_MAGIC;
 }
 
 template <class Value>
@@ -98,25 +106,39 @@ bool MemoryImage::refresh() {
   repair();
   if (!memory_) return false;
   copy(memory_->bytes(), bytes_);
-  return !memory_->lost();  // cut short meanwhile: these were zeros
+  if (memory_->lost()) return false;  // cut short meanwhile: these were zeros
+  return !begins_as_image(memory_->bytes());
+}
+
+bool MemoryImage::is_process_image(const std::string& pool, const std::string& name) {
+  const auto owners = [&pool](uid_t user) { return may_own_memory(pool, user); };
+  const auto opened = MemoryFile::open(pool_memory_name(pool, name), sizeof(plc_image_header),
+                                       MemoryFile::Access::read_only, owners);
+  return opened && opened->guarded() && begins_as_image(opened->bytes());
 }
 
 void MemoryImage::repair() {
   const TimePoint now = MonotonicClock::now();
-  if (memory_ && !memory_->lost() && now < looked_at_ + kSameFor) return;
+  // A file that others have emptied becomes an image where it lies.
+  const bool usable = memory_ && !memory_->lost() && !begins_as_image(memory_->bytes());
+  if (usable && now < looked_at_ + kSameFor) return;
   looked_at_ = now;
   const auto owners = [this](uid_t user) { return may_own_memory(pool_, user); };
   auto opened = MemoryFile::open(pool_memory_name(pool_, name_), bytes_.size(), access_, owners);
-  if (opened && opened->guarded()) {
+  const bool is_image = opened && opened->guarded() && begins_as_image(opened->bytes());
+  if (opened && opened->guarded() && !is_image) {
     if (!memory_ || memory_->lost() || !memory_->same_file(*opened)) memory_ = std::move(*opened);
     tell_again_ = {};
     return;
   }
   memory_.reset();
-  if (now < tell_again_) return;
+  const std::string why = is_image ? "it is a process image; write direction = \"input\" or \"output\""
+                          : opened ? "this process has too many memories of others"
+                                   : opened.error().describe();
+  if (now < tell_again_ && why == told_) return;
   tell_again_ = now + kQuietFor;
-  spdlog::warn("memory '{}' of pool '{}' is not shown: {}", name_, pool_,
-               opened ? "this process has too many memories of others" : opened.error().describe());
+  told_ = why;
+  spdlog::warn("memory '{}' of pool '{}' is not shown: {}", name_, pool_, why);
 }
 
 }  // namespace plchost::modbus

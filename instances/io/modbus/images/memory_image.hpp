@@ -23,6 +23,9 @@ class MemoryImage {
   MemoryImage(std::string pool, std::string name, std::uint32_t size)
       : pool_(std::move(pool)), name_(std::move(name)), bytes_(size) {}
 
+  /// There is a process image of this name. Set-up.
+  [[nodiscard]] static bool is_process_image(const std::string& pool, const std::string& name);
+
   /// It will be written, too. Set-up.
   void make_writable() noexcept { access_ = MemoryFile::Access::read_write; }
 
@@ -33,7 +36,8 @@ class MemoryImage {
   [[nodiscard]] bool put_bits(const RegisterMap& map, std::uint32_t first,
                               std::span<const std::uint8_t> bits);
 
-  /// Calls `look` with the bytes. False: there is no such memory, or it is shorter; the log says why.
+  /// Calls `look` with the bytes. False: there is no such memory, it is shorter, or it is a process image;
+  /// the log says why.
   template <class Look>
   bool look(const Look& look) {
     const std::lock_guard lock(mutex_);
@@ -54,6 +58,7 @@ class MemoryImage {
   std::vector<std::byte> bytes_;
   TimePoint looked_at_;   ///< whether the name leads to another file
   TimePoint tell_again_;  ///< that there is none
+  std::string told_;      ///< why
 };
 
 }  // namespace plchost::modbus
