@@ -171,13 +171,15 @@ TEST(ModbusDevices, KeptOutputsThatSilenceHasClearedAreNotSwitchedOnAgain) {
     ModbusPeer peer(port);
     const ModbusProgram sut(plant, plant.write(device(port, "silent_after_ms = 300")));
     ASSERT_TRUE(follows(plant, peer, 99)) << sut.log();
+    const int silences = sut.told("is silent");
     plant.keep(state);
     const int before = peer.requests();
     ASSERT_TRUE(eventually([&] {
       plant.beat();
       return peer.requests() > before + 100;
     }));
-    EXPECT_TRUE(sut.logged("is silent") || peer.holding(7) == 99) << "without a silence they are kept";
+    EXPECT_TRUE(sut.told("is silent") > silences || peer.holding(7) == 99)
+        << "without a silence they are kept";
     plant.show_safe(PLC_IMAGE_STATE_RUNNING, 99, false);
     ASSERT_TRUE(eventually([&] { return peer.holding(7) == 0; }));
     plant.keep(state);
@@ -219,8 +221,9 @@ TEST(ModbusDevices, TheSafeStateHoldsWhenTheImageIsGoneUntilAnotherPlcWrites) {
     plc_image_write(&next, words.data());
     return peer.holding(7) == 43;
   })) << sut.log();
+  const int silences = sut.told("the PLC of image 't.out' is silent");
   plc_image_close(&next);
-  EXPECT_TRUE(eventually([&] { return sut.logged("the PLC of image 't.out' is silent"); }));
+  EXPECT_TRUE(eventually([&] { return sut.told("the PLC of image 't.out' is silent") > silences; }));
 }
 
 // A device whose PLC was stopped or killed was cleared before there were safe states, and still is.

@@ -135,4 +135,11 @@ std::string ModbusProgram::log() const {
   return text.str();
 }
 
+int ModbusProgram::told(std::string_view text) const {
+  const std::string lines = log();
+  int times = 0;
+  for (std::size_t at = 0; (at = lines.find(text, at)) != std::string::npos; at += text.size()) ++times;
+  return times;
+}
+
 }  // namespace plchost::testing

@@ -71,7 +71,9 @@ class ModbusProgram {
   int end(int signal = 0);
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] std::string log() const;
-  [[nodiscard]] bool logged(std::string_view text) const { return log().find(text) != std::string::npos; }
+  [[nodiscard]] bool logged(std::string_view text) const { return told(text) > 0; }
+  /// How often the log has it.
+  [[nodiscard]] int told(std::string_view text) const;
 
  private:
   std::string log_file_;

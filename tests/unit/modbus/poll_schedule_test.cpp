@@ -52,25 +52,25 @@ TEST(PollSchedule, APauseThatIsShorterThanTheIntervalIsKept) {
 
 TEST(DeviceState, TellsQualityAndAge) {
   DeviceState sut;
-  EXPECT_EQ(sut.status(kStart).age_ms, kNeverRead);
-  EXPECT_EQ(sut.status(kStart).quality, 0);
+  EXPECT_EQ(sut.status(kStart, Duration::max()).age_ms, kNeverRead);
+  EXPECT_EQ(sut.status(kStart, Duration::max()).quality, 0);
   EXPECT_TRUE(sut.is_older(kStart, 1h));
   sut.read(kStart);
   sut.polled(Quality::good, 0);
-  EXPECT_EQ(sut.status(kStart + 42ms).age_ms, 42);
-  EXPECT_EQ(sut.status(kStart + 42ms).quality, 1);
+  EXPECT_EQ(sut.status(kStart + 42ms, Duration::max()).age_ms, 42);
+  EXPECT_EQ(sut.status(kStart + 42ms, Duration::max()).quality, 1);
   EXPECT_FALSE(sut.is_older(kStart + 42ms, 43ms));
   EXPECT_TRUE(sut.is_older(kStart + 43ms, 43ms));
   sut.polled(Quality::exception, 2);
   sut.polled(Quality::lost, 0);
-  EXPECT_EQ(sut.status(kStart).quality, 2);
-  EXPECT_EQ(sut.status(kStart).exception, 2);
-  EXPECT_EQ(sut.status(kStart + 10'000h).age_ms, kNeverRead - 1);
+  EXPECT_EQ(sut.status(kStart, Duration::max()).quality, 2);
+  EXPECT_EQ(sut.status(kStart, Duration::max()).exception, 2);
+  EXPECT_EQ(sut.status(kStart + 10'000h, Duration::max()).age_ms, kNeverRead - 1);
   sut.polled(Quality::good, 0);
-  EXPECT_EQ(sut.status(kStart).exception, 0);
-  const auto counter = sut.status(kStart).counter;
+  EXPECT_EQ(sut.status(kStart, Duration::max()).exception, 0);
+  const auto counter = sut.status(kStart, Duration::max()).counter;
   sut.count();
-  EXPECT_NE(sut.status(kStart).counter, counter);
+  EXPECT_NE(sut.status(kStart, Duration::max()).counter, counter);
 }
 
 TEST(ModbusEndpoint, IsNumeric) {

@@ -136,7 +136,8 @@ bool Device::outputs_of(Output& output, MapValues& values) {
 }
 
 void Device::tell_silence(Output& output, bool silent) const {
-  if (std::exchange(output.is_silent, silent) == silent) return;
+  output.is_silent = silent;
+  if (std::exchange(output.told_silent, silent) == silent) return;
   if (silent) {
     spdlog::warn("device '{}': the PLC of image '{}' is silent: outputs from address {} {}", config_.name,
                  output.image->name(), output.map->address,
@@ -190,9 +191,11 @@ LinkResult Device::tell_apart(const RegisterMap& map) {
     note(read_shape(*other), read);
     if (read) continue;
     // Also if it was refused: a device that refuses all would be asked again and again, and others wait.
-    read.error().text += fmt::format(
-        ", when it was asked for {} from address {} to tell late responses apart{}", other->count,
-        other->address, read.error().exception == 0 ? "; if it never answers that, set probe = false" : "");
+    if (!read.error().not_sent && !read.error().not_asked) {
+      read.error().text += fmt::format(
+          ", when it was asked for {} from address {} to tell late responses apart{}", other->count,
+          other->address, read.error().timed_out ? "; if it never answers that, set probe = false" : "");
+    }
     return read;
   }
   return {};
@@ -209,8 +212,24 @@ void Device::note(ResponseShape shape, const LinkResult& result) {
   }
 }
 
+// Zeros in place of inputs are not good.
+Duration Device::good_for() const noexcept {
+  return config_.when_gone == LossPolicy::zero && !inputs_.empty() ? config_.gone_after : Duration::max();
+}
+
 bool Device::is_gone(TimePoint now) const {
   return config_.when_gone == LossPolicy::zero && state_.is_older(now, config_.gone_after);
+}
+
+// Once, until the device is lost and answers again.
+void Device::tell_old_inputs(TimePoint now) {
+  if (told_old_ || good_for() == Duration::max() || !is_gone(now)) return;
+  told_old_ = true;
+  spdlog::warn(
+      "device '{}' answers, but its inputs became {} ms old, and zero at gone_after_ms = {}; give "
+      "gone_after_ms more than the time of two polls",
+      config_.name, state_.status(now, good_for()).age_ms,
+      std::chrono::duration_cast<std::chrono::milliseconds>(config_.gone_after).count());
 }
 
 // A reading may take so long that its inputs are too old from the beginning: then they are never shown.
@@ -237,11 +256,14 @@ void Device::end_poll(const LinkResult& written, const LinkResult& read, TimePoi
   const std::uint8_t exception = failure != nullptr         ? failure->exception
                                  : refused != inputs_.end() ? refused->refused
                                                             : std::uint8_t{0};
+  const bool was_good = quality_ == Quality::good;
   quality_ = failure == nullptr ? Quality::good : failure->is_refusal() ? Quality::exception : Quality::lost;
   if (quality_ == Quality::lost) {
+    told_old_ = false;
     for (Output& output : outputs_) output.is_written = false;
   }
   const TimePoint now = MonotonicClock::now();
+  if (was_good && read) tell_old_inputs(now);
   if (read) {
     state_.read(asked_at);  // first: inputs that are too old become zero
     publish_inputs(now);
@@ -314,7 +336,7 @@ void Device::show(const InputImage& image, std::span<std::byte> bytes, TimePoint
     }
   }
   if (status_image_ != &image) return;
-  const DeviceStatus status = ended ? DeviceStatus{.age_ms = kNeverRead} : state_.status(now);
+  const DeviceStatus status = ended ? DeviceStatus{.age_ms = kNeverRead} : state_.status(now, good_for());
   std::memcpy(bytes.data() + config_.status_offset, &status, sizeof status);
 }
 

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -62,7 +63,8 @@ class Device {
     bool is_written = false;
     std::uint64_t connection = 0;  ///< on which it was written
     TimePoint written_at;
-    bool is_silent = true;  ///< its PLC; at first nothing was put out
+    bool is_silent = true;                 ///< its PLC; at first nothing was put out
+    std::optional<bool> told_silent = {};  ///< in the log
   };
 
   [[nodiscard]] LinkResult write_outputs();
@@ -77,6 +79,8 @@ class Device {
   [[nodiscard]] LinkResult tell_apart(const RegisterMap& map);
   void note(ResponseShape shape, const LinkResult& result);
   [[nodiscard]] bool is_gone(TimePoint now) const;
+  [[nodiscard]] Duration good_for() const noexcept;
+  void tell_old_inputs(TimePoint now);
   void publish_inputs(TimePoint now);
   void make_safe();
   void end_poll(const LinkResult& written, const LinkResult& read, TimePoint asked_at);
@@ -95,6 +99,7 @@ class Device {
   std::atomic<bool> has_ended_{false};
   std::atomic<bool> yields_{false};
   bool asked_ = false;               ///< the poll has something to ask
+  bool told_old_ = false;            ///< that its inputs were too old, in the log
   bool touched_ = false;             ///< outputs were sent to it
   Quality quality_ = Quality::none;  ///< of the last poll
   Quality told_ = Quality::none;     ///< in the log

@@ -202,7 +202,9 @@ std::expected<Pdu, LinkFailure> Link::ask_line(const DeviceConfig& device, Limit
 std::unexpected<LinkFailure> Link::line_failure(int error, bool has_begun) {
   const bool is_garbled = error > MODBUS_ENOBASE || (error == ETIMEDOUT && has_begun);
   if (error != ETIMEDOUT && !is_garbled) close_line();
-  return std::unexpected(LinkFailure{.text = modbus_strerror(error), .is_garbled = is_garbled});
+  const bool timed_out = error == ETIMEDOUT && !has_begun;
+  return std::unexpected(
+      LinkFailure{.text = modbus_strerror(error), .timed_out = timed_out, .is_garbled = is_garbled});
 }
 
 // A late response of another unit is none of this one, which may still answer.

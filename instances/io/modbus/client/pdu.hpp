@@ -23,6 +23,7 @@ struct LinkFailure {
   bool not_sent = false;    ///< the line or the connection is not open
   bool not_asked = false;   ///< this process ends: nothing was sent, nothing is known of the device
   bool at_rest = false;     ///< the connection had ended before the response began
+  bool timed_out = false;   ///< nothing came at a serial line
   bool is_garbled = false;  ///< bytes came at a serial line, but no whole response of the device
 
   /// The device has answered, and refuses the request. A gateway refuses with codes of its own if it does not
