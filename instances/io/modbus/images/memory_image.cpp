@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstring>
 
 #include "instances/io/modbus/config/map_values.hpp"
@@ -33,8 +34,9 @@ void copy(std::span<const std::byte> from, std::span<std::byte> to) noexcept {
 // Of any version and size: others read and write it by its header.
 bool begins_as_image(std::span<const std::byte> bytes) noexcept {
   if (bytes.size() < sizeof(plc_image_header)) return false;
-  const auto* const header = reinterpret_cast<const plc_image_header*>(bytes.data());
-  return __atomic_load_n(&header->magic, __ATOMIC_ACQUIRE) == PLC_IMAGE_MAGIC;
+  const auto* const word =
+      reinterpret_cast<const plc_image_u64*>(bytes.data() + offsetof(plc_image_header, magic));
+  return __atomic_load_n(word, __ATOMIC_ACQUIRE) == PLC_IMAGE_MAGIC;
 }
 
 template <class Value>
