@@ -1,6 +1,7 @@
 #include "instances/adapters/plcopen/write_elements.hpp"
 
 #include <algorithm>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -20,6 +21,26 @@ using pugi::xml_node;
 /// Of the data that plchost adds to a task.
 constexpr const char* kTaskData = "https://plchost/task";
 constexpr const char* kTaskElement = "PlchostTask";
+
+/// Words of ST that MATIEC or STruC++ takes for no name of a variable.
+constexpr std::string_view kWords =
+    " ABSTRACT ACTION AND ANY ANY_BIT ANY_DATE ANY_DERIVED ANY_ELEMENTARY ANY_INT ANY_MAGNITUDE"
+    " ANY_NUM ANY_REAL ANY_STRING ARRAY AT BOOL BY BYTE CASE CONFIGURATION CONSTANT CONTINUE DATE"
+    " DATE_AND_TIME DINT DO DREF DT DWORD ELSE ELSIF EN END_ACTION END_CASE END_CONFIGURATION END_FOR"
+    " END_FUNCTION END_FUNCTION_BLOCK END_GET END_IF END_INTERFACE END_METHOD END_PROGRAM END_PROPERTY"
+    " END_REPEAT END_RESOURCE END_SET END_STEP END_STRUCT END_TRANSITION END_TYPE END_VAR END_WHILE"
+    " ENO EXIT EXTENDS FALSE FINAL FOR FROM FUNCTION FUNCTION_BLOCK F_EDGE IF IMPLEMENTS INITIAL_STEP"
+    " INT INTERFACE INTERVAL LINT LREAL LTIME LWORD METHOD MOD NON_RETAIN NOT NULL OF ON OR OVERRIDE"
+    " POINTER PRIORITY PRIVATE PROGRAM PROPERTY PROTECTED PUBLIC READ_ONLY READ_WRITE REAL REF"
+    " REFERENCE_TO REF_TO REPEAT RESOURCE RETAIN RETURN R_EDGE SINGLE SINT STEP STRING STRUCT SUPER"
+    " TASK THEN THIS TIME TIME_OF_DAY TO TOD TRANSITION TRUE TYPE UDINT UINT ULINT UNTIL USINT VAR"
+    " VAR_ACCESS VAR_CONFIG VAR_EXTERNAL VAR_GLOBAL VAR_INPUT VAR_INST VAR_IN_OUT VAR_OUTPUT VAR_TEMP"
+    " WHILE WITH WORD WSTRING XOR"
+    " ";
+
+bool is_word(std::string_view name) {
+  return kWords.contains(fmt::format(" {} ", folded(std::string(name))));
+}
 
 /// The words of a type in ST, as PLCopen has them.
 class TypeElements {
@@ -94,7 +115,12 @@ xml_node add(xml_node parent, const char* element, const std::string& name) {
 std::string Names::of(std::string_view name) {
   std::string result(name.empty() ? "_" : name);
   std::ranges::replace_if(result, [](char c) { return !is_identifier(std::string{'_', c}); }, '_');
-  if (!is_identifier(result)) result.insert(0, 1, '_');
+  // iec2c knows no name with two of them in a row, nor one that ends with one.
+  const auto repeated = std::ranges::unique(result, [](char a, char b) { return a == '_' && b == '_'; });
+  result.erase(repeated.begin(), repeated.end());
+  while (result.ends_with('_')) result.pop_back();
+  if (result.empty()) result = "1";
+  if (!is_identifier(result) || is_word(result)) result.insert(0, 1, '_');
   std::string unique = result;
   for (unsigned number = 2; !taken_.insert(folded(unique)).second; ++number)
     unique = fmt::format("{}_{}", result, number);

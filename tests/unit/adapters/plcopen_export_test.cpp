@@ -123,6 +123,37 @@ TEST(PlcopenExport, TellsWhatStHasNoWordsFor) {
   EXPECT_EQ(resource.globals[0].name + resource.globals[0].type, "edge_of_a_b_2BOOL");
 }
 
+TEST(PlcopenExport, ChangesNamesThatAreWordsOfSt) {
+  ExportedInstance one{.name = "Resource", .tasks = {}, .programs = {}, .variables = {}};
+  one.tasks = {{.name = "if", .kind = Kind::cyclic, .priority = 1, .interval_ns = 1'000'000, .event = ""}};
+  one.programs = {{.name = "Step", .type = "Function", .task = "if"}};
+  one.variables = {{.path = "at", .type = "BOOL", .address = ""},
+                   {.path = "_At", .type = "BOOL", .address = ""},
+                   {.path = "pump.int", .type = "INT", .address = ""},
+                   {.path = "pump.a__b_", .type = "INT", .address = ""},
+                   {.path = "pump.IN", .type = "INT", .address = ""},
+                   {.path = "Step.end_if", .type = "INT", .address = ""},
+                   {.path = "Step.end_iff", .type = "Type", .address = ""}};
+  const std::string xml = project_of(plant_of({one}));
+  for (const char* const name : {"Resource", "if", "Step", "Function", "at", "int", "end_if", "a__b_"})
+    EXPECT_THAT(xml, HasSubstr(std::string("its name in plchost is ") + name + "<"));
+  const iec::Project project = read_again(xml);
+  const iec::Resource& resource = project.configurations.at(0).resources.at(0);
+  EXPECT_EQ(resource.name, "_Resource");
+  EXPECT_EQ(resource.tasks.at(0).name, "_if");
+  EXPECT_EQ(resource.programs.at(0).name + resource.programs[0].type, "_Step_Function");
+  std::vector<std::string> declared;
+  for (const iec::Variable& variable : project.configurations[0].globals)
+    declared.push_back(variable.name + ": " + variable.type);
+  for (const iec::Variable& variable : project.pou("_Function")->variables)
+    declared.push_back(variable.name + ": " + variable.type);
+  EXPECT_THAT(declared,
+              ElementsAre("_at: BOOL", "_At_2: BOOL", "pump: pump_type", "_end_if: INT", "end_iff: _Type"));
+  ASSERT_EQ(project.types.size(), 1U);
+  EXPECT_EQ(project.types[0].definition,
+            "PUMP_TYPE : STRUCT _INT : INT ; A_B : INT ; IN : INT ; END_STRUCT ; ");
+}
+
 TEST(PlcopenExport, HasArraysOfStructuresAndAddressesThatStAllows) {
   ExportedInstance one{.name = "line1", .tasks = {}, .programs = {}, .variables = {}};
   one.variables = {{.path = "lamp", .type = "BOOL", .address = "%QX0.1"},
