@@ -11,6 +11,7 @@
 
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
+#include "shm/variables/indexed_name.hpp"
 #include "shm/variables/variable_type.hpp"
 
 namespace plchost {
@@ -79,6 +80,17 @@ void choose_like(Chosen& chosen, const SymbolTable& table, const std::string& pa
   }
 }
 
+// Of a whole array those elements are shown that lie in so many bytes. So an empty page has room for each
+// row, and each row shows a value.
+constexpr std::size_t kShownArrayBytes = 16'384;
+static_assert(kMaxVariableBytes <= kShownArrayBytes && kShownArrayBytes <= kMaxValueBytes);
+static_assert(kShownElements <= kMaxRequestedValues);
+
+std::size_t shown_elements(const VariableSymbol& symbol) {
+  const std::size_t most = std::min<std::size_t>(kShownElements, kShownArrayBytes / symbol.bytes);
+  return std::min<std::size_t>(symbol.elements(), most);
+}
+
 // Adds up what a page holds.
 class Page {
  public:
@@ -88,7 +100,7 @@ class Page {
   bool add(SelectedVariable row) {
     const VariableSymbol& symbol = table_.symbols()[row.symbol];
     row.first = selection_.elements.size();
-    row.count = row.element ? 1 : std::min<std::size_t>(symbol.elements(), kShownElements);
+    row.count = row.element ? 1 : shown_elements(symbol);
     const std::size_t values = row.count * symbol.bytes;
     // A byte of a string has up to three characters.
     const std::size_t text = std::min(kMostValueText, std::max<std::size_t>(values * 3, 40));
@@ -177,6 +189,7 @@ Result<VariableSelection> select_variables(const SymbolTable& table, const Varia
   PLCHOST_TRY(check_wildcards(query));
   for (const std::string& pattern : query.patterns) {
     if (has_wildcard(pattern)) {
+      PLCHOST_TRY(IndexedName::parse(pattern));
       choose_like(chosen, table, pattern, query.after);
       continue;
     }

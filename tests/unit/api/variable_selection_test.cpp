@@ -79,6 +79,12 @@ TEST(VariableSelection, RefusesANameThatIsNoVariable) {
   EXPECT_FALSE(select_variables(plant(), {.patterns = {"Grid[3,0]"}}));
   EXPECT_FALSE(select_variables(plant(), {.patterns = {"Grid[1]"}}));
   EXPECT_FALSE(select_variables(plant(), {.patterns = {"Grid[1,0"}}));
+  for (const char* const wrong : {"Grid[1?,0]", "*[x]", "Gr*[1,0", "Grid[0*]"}) {
+    const auto refused = select_variables(plant(), {.patterns = {wrong}});
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().code, ErrorCode::invalid_argument);
+    EXPECT_THAT(refused.error().message, HasSubstr("an index is a number"));
+  }
 }
 
 TEST(VariableSelection, HasABoundOfPatternsThatAreLookedForEverywhere) {
@@ -141,6 +147,29 @@ TEST(VariableSelection, AsksForNoMoreThanOneSampleHolds) {
   EXPECT_LE(page->rows.size() * kMaxVariableBytes, kMaxValueBytes);
 }
 
+VariableSymbol texts_of_bytes(std::string name, std::uint32_t bytes, std::uint32_t count) {
+  VariableSymbol texts = number(std::move(name), {{0, count}});
+  texts.type = VariableType::string;
+  texts.bytes = bytes;
+  return texts;
+}
+
+// Each row fits into an empty page, so a page goes on behind the one before.
+TEST(VariableSelection, ShowsOfAnArrayOfLongTextsAsManyAsOneSampleHolds) {
+  const SymbolTable table = table_of({texts_of_bytes("few[]", 255, 64), texts_of_bytes("long[]", 1537, 64),
+                                      texts_of_bytes("most[]", kMaxVariableBytes, 25), number("speed")});
+  EXPECT_THAT(names_of(table, {}), ElementsAre("few[]", "long[]", "most[]", "speed"));
+  EXPECT_THAT(names_of(table, {.patterns = {"MOST"}}), ElementsAre("most[]"));
+  EXPECT_THAT(names_of(table, {.patterns = {"*o*"}}), ElementsAre("long[]", "most[]"));
+  const auto page = select_variables(table, {});
+  ASSERT_TRUE(page);
+  EXPECT_TRUE(page->complete);
+  ASSERT_EQ(page->rows.size(), 4U);
+  EXPECT_EQ(page->rows[0].count, 64U);
+  EXPECT_EQ(page->rows[1].count, 10U);
+  EXPECT_EQ(page->rows[2].count, 4U);
+}
+
 TEST(VariableRecords, ShowValuesTypesAndTasks) {
   const SymbolTable table = plant();
   const auto selection = select_variables(table, {.patterns = {"Grid", "Grid[2,0]", "line.speed"}});
@@ -166,6 +195,18 @@ TEST(VariableRecords, CutALongArrayAndSaySo) {
   EXPECT_THAT(value, StartsWith("[20000, 20001, "));
   EXPECT_TRUE(value.ends_with("...")) << value;
   EXPECT_LE(value.size(), 1023U);
+}
+
+// The rest of the array is not asked for, so the row says that there is more.
+TEST(VariableRecords, SayThatAnArrayOfLongTextsIsNotWhole) {
+  const SymbolTable table = table_of({texts_of_bytes("most[]", kMaxVariableBytes, 25)});
+  const auto page = select_variables(table, {});
+  ASSERT_TRUE(page);
+  ValueReply reply{.elements = page->elements, .forced = {}, .values = {}};
+  reply.values.assign(page->elements.size() * kMaxVariableBytes, std::byte{0});
+  const auto records = records_of(table, *page, reply, {});
+  ASSERT_EQ(records.size(), 1U);
+  EXPECT_EQ(dds::text_of(records[0].value), "['', '', '', ''...");
 }
 
 VariableSymbol text_of_bytes(std::string name, std::uint32_t bytes) {
