@@ -10,15 +10,16 @@
 namespace plchost {
 
 Result<std::vector<ListedVariable>> VariableSampler::all() {
-  std::vector<ListedVariable> variables;
+  VariableListing all;
   VariableQuery query = query_;
   for (bool goes_on = true; goes_on;) {
     PLCHOST_TRY_ASSIGN(
         auto page, session_.client().value()->list_variables(host_, instance_, query, session_.deadline()));
     PLCHOST_TRY_ASSIGN(goes_on, next_page(host_, page, query));
-    std::ranges::move(page.variables, std::back_inserter(variables));
+    std::ranges::move(page.variables, std::back_inserter(all.variables));
   }
-  return variables;
+  PLCHOST_TRY_ASSIGN(all, sample_in(std::move(all), instance_, query_));
+  return std::move(all.variables);
 }
 
 Result<VariableListing> VariableSampler::sample(TimePoint until) {

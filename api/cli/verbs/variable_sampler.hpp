@@ -17,7 +17,7 @@ class VariableSampler {
   [[nodiscard]] const std::string& host() const noexcept { return host_; }
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
 
-  /// All of them, page by page: the values of each page are of one moment.
+  /// All of them, page by page: the values of each page are of one moment. not_found: no name is like these.
   [[nodiscard]] Result<std::vector<ListedVariable>> all();
   /// All of them, with their values of one moment. full: they are more than one page holds.
   /// It is waited for until then at most.
@@ -32,6 +32,6 @@ class VariableSampler {
 
 /// For the help of arguments.
 inline constexpr const char* kVariableNames =
-    "names, as 'Line.speed', 'Grid[1,2]' or 'Grid[*]'; '*' any characters, '?' one; case does not count";
+    "names, as 'Line.speed', 'Grid[1,2]' or 'Grid[*,*]'; '*' any characters, '?' one; case does not count";
 
 }  // namespace plchost

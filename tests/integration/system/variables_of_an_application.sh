@@ -24,6 +24,9 @@ is "$(value 'grid[2,1]')" 21 || fail "$(plcctl list variables line1 grid)"
 is "$(value line.LABEL)" "'press'" || fail "$(value line.label)"
 refused "no variable 'line.totel'" plcctl read variable line1 line.totel
 refused "'line7'" plcctl list variables line7
+refused "no variable of 'line1' is like lane.*" plcctl list variables line1 'lane.*'
+refused "no variable of 'line1' is like grid[*]" plcctl list variables line1 'grid[*]'
+is "$(asked plcctl list variables line1 'grid[*,*]' --json | jq length)" 6 || fail "$(plcctl list variables line1 'grid[*,*]')"
 refused "no variable of 'line1' is like lane.*" plcctl read variable line1 'lane.*'
 refused "no variable of 'line1' is like lane.*" plcctl watch variables line1 'lane.*'
 refused "no variable of 'line1' is like lane.*" plcctl record variables line1 'lane.*' --duration 0.1
