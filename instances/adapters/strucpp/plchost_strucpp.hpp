@@ -47,6 +47,7 @@ class plchost_mutex {
 #include "iec_global.hpp"
 #undef mutex
 #include "iec_array.hpp"
+#include "iec_enum.hpp"
 #include "iec_std_lib.hpp"
 
 // The library's clock is a variable of each thread, which takes memory at its first use. This one is that of
@@ -58,6 +59,59 @@ inline IEC_TIME plchost_time() {
 }
 }  // namespace strucpp
 #define TIME(...) plchost_time(__VA_ARGS__)
+
+// Functions of texts, of which each is a literal: the library knows those of variables only.
+namespace strucpp {
+using plchost_text = IECString<254>;
+inline plchost_text LEFT(const char* text, std::size_t count) {
+  return LEFT(plchost_text(text), count);
+}
+inline plchost_text RIGHT(const char* text, std::size_t count) {
+  return RIGHT(plchost_text(text), count);
+}
+inline plchost_text MID(const char* text, std::size_t count, std::size_t from) {
+  return MID(plchost_text(text), count, from);
+}
+template <class... Others>
+inline auto CONCAT(const char* first, const char* second, const Others&... others) {
+  return CONCAT(plchost_text(first), plchost_text(second), plchost_text(others)...);
+}
+inline plchost_text DELETE_STR(const char* text, std::size_t count, std::size_t from) {
+  return DELETE_STR(plchost_text(text), count, from);
+}
+inline plchost_text INSERT(const char* text, const char* other, std::size_t at) {
+  return INSERT(plchost_text(text), plchost_text(other), at);
+}
+inline plchost_text REPLACE(const char* text, const char* other, std::size_t count, std::size_t from) {
+  return REPLACE(plchost_text(text), plchost_text(other), count, from);
+}
+inline std::size_t FIND(const char* text, const char* part) {
+  return FIND(plchost_text(text), plchost_text(part));
+}
+inline std::size_t LEN(const char* text) {
+  return LEN(plchost_text(text));
+}
+// Numbers of such texts, and of enumerations.
+#define PLCHOST_NUMBER(name)                                  \
+  inline IEC_##name TO_##name(const char* text) {             \
+    return TO_##name(plchost_text(text));                     \
+  }                                                           \
+  template <class E>                                          \
+  inline IEC_##name TO_##name(const IEC_ENUM_Var<E>& value) { \
+    return TO_##name(static_cast<E>(value));                  \
+  }
+PLCHOST_NUMBER(SINT)
+PLCHOST_NUMBER(INT)
+PLCHOST_NUMBER(DINT)
+PLCHOST_NUMBER(LINT)
+PLCHOST_NUMBER(USINT)
+PLCHOST_NUMBER(UINT)
+PLCHOST_NUMBER(UDINT)
+PLCHOST_NUMBER(ULINT)
+PLCHOST_NUMBER(REAL)
+PLCHOST_NUMBER(LREAL)
+#undef PLCHOST_NUMBER
+}  // namespace strucpp
 
 // INSERT puts a text behind position P, and that of the library before it.
 namespace strucpp {
@@ -171,10 +225,18 @@ struct plchost_shown {
   } dimension[3];
 };
 
+template <class E>
+inline constexpr unsigned int plchost_enumeration = sizeof(E) == 1   ? 2
+                                                    : sizeof(E) == 2 ? 3
+                                                    : sizeof(E) == 4 ? 4
+                                                                     : 5;  // PLC_TYPE_SINT to _LINT
+
 // How a value in memory is to be read; 0: it is not as the table for debuggers has it.
 template <class T>
 struct plchost_type {
   static constexpr unsigned int of(const plchost_shown& shown) {
+    // Arrays and aliases of an enumeration have it bare.
+    if constexpr (std::is_enum_v<T>) return plchost_enumeration<T>;
     return std::is_arithmetic_v<T> && sizeof(T) == shown.bytes ? shown.type : 0;
   }
 };
@@ -182,11 +244,6 @@ template <std::size_t N>
 struct plchost_type<strucpp::IECString<N>> {
   static constexpr unsigned int of(const plchost_shown& shown) { return shown.bytes == 0 ? shown.type : 0; }
 };
-template <class E>
-inline constexpr unsigned int plchost_enumeration = sizeof(E) == 1   ? 2
-                                                    : sizeof(E) == 2 ? 3
-                                                    : sizeof(E) == 4 ? 4
-                                                                     : 5;  // PLC_TYPE_SINT to _LINT
 template <class E>
 struct plchost_type<strucpp::IEC_ENUM_Value<E>> {
   static constexpr unsigned int of(const plchost_shown&) { return plchost_enumeration<E>; }
