@@ -266,6 +266,93 @@ function literalProblem(node, isInitial, nanosecondsOf) {
   return undefined;
 }
 
+// The part of a source that a node is; undefined: it has several lines.
+function textOf({ sourceSpan }) {
+  const { file, startLine, startCol, endLine, endCol } = sourceSpan;
+  return startLine === endLine ? lines[fileNumbers.get(file)]?.[startLine - 1]?.slice(startCol - 1, endCol) : undefined;
+}
+
+// The inputs that a call without names leaves out. The compiler gives them zeros, whatever their initial values are.
+function omittedInputs(call, pou) {
+  const sections = pou.varBlocks.filter((block) => ['VAR_INPUT', 'VAR_OUTPUT', 'VAR_IN_OUT'].includes(block.blockType));
+  const all = sections.flatMap((block) => block.declarations.flatMap((declaration) => declaration.names.map((name) => ({ name, block, declaration }))));
+  const omitted = all.slice(call.arguments.length);
+  const last = omitted.findLastIndex(({ block, declaration }) => block.blockType === 'VAR_INPUT' && declaration.initialValue !== undefined);
+  return omitted.slice(0, last + 1);
+}
+
+// Gives such calls these values, in the text. Returns those that need an input by its name.
+function completeCalls(ast) {
+  const functions = new Map(ast.functions.map((pou) => [pou.name.toUpperCase(), pou]));
+  const problems = [];
+  const insertions = [];
+  for (const node of nodesIn(ast)) {
+    const pou = node.kind === 'FunctionCallExpression' ? functions.get(node.functionName.toUpperCase()) : undefined;
+    if (pou === undefined || node.arguments.some((one) => one.name !== undefined)) continue;
+    const omitted = omittedInputs(node, pou);
+    if (omitted.length === 0) continue;
+    const values = omitted.map(({ block, declaration }) => (block.blockType === 'VAR_INPUT' && declaration.initialValue !== undefined ? textOf(declaration.initialValue) : undefined));
+    const { file, endLine, endCol } = node.sourceSpan;
+    const number = fileNumbers.get(file);
+    const isClosed = lines[number]?.[endLine - 1]?.[endCol - 1] === ')';
+    if (isClosed && values.every((value) => value !== undefined)) {
+      insertions.push({ number, line: endLine, column: endCol, text: `${node.arguments.length > 0 ? ', ' : ''}${values.join(', ')}` });
+    } else {
+      problems.push({ place: placeOf(node), text: `${pou.name}: STruC++ makes zeros of inputs that are left out here; name one, as ${omitted.at(-1).name} := ...` });
+    }
+  }
+  insertions.sort((one, other) => other.number - one.number || other.line - one.line || other.column - one.column);
+  const added = insertions.map((one) => ({ ...one, place: inSource(inCharacters({ place: [one.number, one.line, one.column] })).place }));
+  for (const { number, line, column, text, place } of added) {
+    const before = lines[number][line - 1];
+    lines[number][line - 1] = before.slice(0, column - 1) + text + before.slice(column - 1);
+    sources[number].text = lines[number].join('\n');
+    sources[number].inserted = [...(sources[number].inserted ?? []), { line, column: place[2], length: [...text].length }];
+    sources[number].inserted.sort((one, other) => one.line - other.line || one.column - other.column);
+  }
+  return { isChanged: insertions.length > 0, problems: problems.sort(byPlace) };
+}
+
+// The default of an enumeration's TYPE, which the compiler drops: in C++ it becomes that of its class. Arrays and aliases
+// get this class, too, for the compiler gives them the bare enumeration, which begins with 0.
+class Enumerations {
+  constructor({ ast, headerCode }) {
+    this.problems = [];
+    this.defaults = new Map(); // values in C++, by the name of the type
+    this.aliases = new Set();
+    for (const type of ast.types) {
+      const { kind, defaultValue } = type.definition;
+      if (kind !== 'EnumDefinition' || defaultValue === undefined) continue;
+      const name = type.name.toUpperCase();
+      const members = new RegExp(`^enum class ${name}\\b[^{]*\\{([^}]*)\\}`, 'm').exec(headerCode)?.[1] ?? '';
+      const value = new RegExp(`\\b${defaultValue}_?(?=\\s*(?:[,=]|$))`, 'i').exec(members)?.[0];
+      if (value === undefined) this.problems.push({ place: placeOf(type), text: `${defaultValue} is no value of ${type.name}` });
+      else this.defaults.set(name, value);
+    }
+    for (let before = -1; before !== this.aliases.size; ) {
+      before = this.aliases.size;
+      for (const { name, definition } of ast.types) {
+        const of = definition.kind === 'TypeReference' ? definition.name.toUpperCase() : '';
+        if (this.defaults.has(of) || this.aliases.has(of)) this.aliases.add(name.toUpperCase());
+      }
+    }
+  }
+
+  // Of C++, in which texts stay as they are.
+  withDefaults(code) {
+    if (this.defaults.size === 0) return code;
+    const names = [...this.defaults.keys()].join('|');
+    const made = code
+      .replace(new RegExp(`"(?:\\\\.|[^"\\\\\n])*"|(\\bArray(?:View)?\\dD<)(?=(?:${names})[,>])`, 'g'), (all, array) => (array === undefined ? all : `${array}IEC_`))
+      .replace(new RegExp(`^(using IEC_(${names}) = IEC_ENUM<\\2>;)`, 'gm'), (all, line, name) => `${line} template <> constexpr IEC_ENUM_Value<${name}>::IEC_ENUM_Value() noexcept : value_(${name}::${this.defaults.get(name)}) {}`);
+    if (this.aliases.size === 0) return made;
+    const aliases = [...this.aliases].join('|');
+    return made
+      .replace(new RegExp(`^(using (?:${aliases}) = )(?=(?:${names});)`, 'gm'), '$1IEC_')
+      .replace(new RegExp(`^using IEC_(${aliases}) = IECVar<\\1>;`, 'gm'), 'using IEC_$1 = $1;');
+  }
+}
+
 class Plan {
   constructor(result) {
     this.ast = result.ast;
@@ -769,7 +856,9 @@ function bounded(messages) {
   return [...messages.slice(0, kMostMessages), { place: [-1, 0, 0], text: `${more} more messages of this kind are not told` }];
 }
 
-const result = translate();
+let result = translate();
+const calls = result.success ? completeCalls(result.ast) : { isChanged: false, problems: [] };
+if (calls.isChanged) result = translate();
 const plan = {
   format: 1,
   problems: result.success ? [] : bounded(result.errors.map(message)),
@@ -784,9 +873,11 @@ const plan = {
 if (!result.success && plan.problems.length === 0) plan.problems.push({ place: [-1, 0, 0], text: 'STruC++ has failed, and has not said why' });
 if (result.success) {
   const found = new Plan(result);
+  const enumerations = new Enumerations(result);
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
+  plan.problems.push(...enumerations.problems, ...calls.problems);
   plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()), ...found.checkTimes(), ...found.checkConstants());
   for (const { number, line, name, location, isTaken } of places.values()) {
     if (isTaken !== true) plan.problems.push({ place: [number, line, 0], text: `${name} AT ${location}: the declaration is not understood` });
@@ -808,10 +899,10 @@ if (result.success) {
   const warnings = result.warnings.filter((warning) => !warning.message.includes('has no task assignment'));
   plan.remarks = bounded([...warnings.map(message), ...found.remarks]);
   for (const file of result.cppFiles) {
-    writeFileSync(file.name, file.content, { flag: 'wx' });
+    writeFileSync(file.name, enumerations.withDefaults(file.content), { flag: 'wx' });
     plan.files.push(file.name);
   }
-  writeFileSync('generated.hpp', result.headerCode, { flag: 'wx' });
+  writeFileSync('generated.hpp', enumerations.withDefaults(result.headerCode), { flag: 'wx' });
   writeFileSync('debug_table.cpp', table, { flag: 'wx' });
   writeFileSync('debug_map.json', JSON.stringify(result.debugMap ?? {}), { flag: 'wx' });
 }

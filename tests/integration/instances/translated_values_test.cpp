@@ -126,6 +126,102 @@ TEST_F(ValuesOfTranslatedText, ByStrucppAreThoseOfTheStandard) {
   }
 }
 
+TEST_F(ValuesOfTranslatedText, OfAnEnumerationsTypeAreInitialOnesByStrucpp) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const std::string types =
+      "TYPE Color : (red, green, blue) := green; Shade : Color; Tint : Shade;\n"
+      "Box : STRUCT c : Color; d : Color := blue; e : ARRAY[0..1] OF Color; s : Shade; END_STRUCT;\n"
+      "Row : ARRAY[1..2] OF Color; Plain : (none, some); Other : Plain; END_TYPE\n"
+      "FUNCTION Its : Color VAR_INPUT set : BOOL; END_VAR IF set THEN Its := blue; END_IF; END_FUNCTION\n"
+      "FUNCTION_BLOCK Lamp VAR_INPUT c : Color; END_VAR VAR_OUTPUT copy : Color; END_VAR copy := c; "
+      "END_FUNCTION_BLOCK\n"
+      "PROGRAM Main\nVAR c : Color; d : Color := blue; s : Shade; t : Tint; b : Box; a : ARRAY[1..2] OF "
+      "Color;\n"
+      "g : ARRAY[0..1, 1..2] OF Shade; row1 : Row; lamp1 : Lamp; f : Color; other1 : Other; cycles : DINT; "
+      "number : INT; same, isGreen : BOOL; others : ARRAY[1..2] OF Plain; END_VAR\n"
+      "lamp1(); f := Its(FALSE); same := a[1] = s; number := TO_INT(a[2]) + TO_INT(c); CASE a[2] OF green: "
+      "isGreen := TRUE; END_CASE;\n"
+      "cycles := cycles + 1;\nEND_PROGRAM\n"
+      "CONFIGURATION cell VAR_GLOBAL gc : Color; gs : Shade; ga : ARRAY[1..2] OF Color; END_VAR\n"
+      "RESOURCE press ON PLC TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
+      "END_RESOURCE END_CONFIGURATION\n";
+  const auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", types), "-o",
+                                sandbox.folder() + "/values.so", "--compiler", "strucpp"},
+                               sandbox.folder());
+  ASSERT_TRUE(end && end->success()) << end->output;
+  InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
+  sut.wait_until_up();
+  ValueClient client(sandbox);
+  EXPECT_TRUE(eventually([&] { return client.read("one.cycles") != "0"; }));
+  for (const char* const name :
+       {"one.c", "one.s", "one.t", "one.b.C", "one.b.E[1]", "one.b.S", "one.a[2]", "one.g[1,2]",
+        "one.row1[1]", "one.lamp1.c", "one.lamp1.copy", "one.f", "gc", "gs", "ga[2]"}) {
+    EXPECT_EQ(client.read(name), "1") << name;
+  }
+  for (const auto& [name, value] : {std::pair{"one.d", "2"},
+                                    {"one.b.D", "2"},
+                                    {"one.same", "TRUE"},
+                                    {"one.number", "2"},
+                                    {"one.isGreen", "TRUE"},
+                                    {"one.other1", "0"},
+                                    {"one.others[2]", "0"}}) {
+    EXPECT_EQ(client.read(name), value) << name;
+  }
+}
+
+TEST_F(ValuesOfTranslatedText, OfInputsThatACallLeavesOutAreInitialOnesByStrucpp) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const std::string text =
+      "FUNCTION Join : INT VAR_INPUT a : INT := 5; b : INT := 7; END_VAR Join := a * 10 + b; END_FUNCTION\n"
+      "PROGRAM Main\nVAR i1, i2, i3, i4, cycles : DINT; t1, t2 : STRING; END_VAR\n"
+      "i1 := Join(); i2 := Join(Join()); i3 := Join(1); i4 := Join(b := 1);\n"
+      "t1 := CONCAT(LEFT('abc', 2), MID('xyz', 1, 2)); t2 := INSERT('ABCDE', 'xy', 2);\n"
+      "cycles := FIND('abc', 'c') + LEN(CONCAT('a', 'b', 'c')) + STRING_TO_INT('123');\nEND_PROGRAM\n"
+      "CONFIGURATION cell RESOURCE press ON PLC\n"
+      "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
+      "END_RESOURCE END_CONFIGURATION\n";
+  const auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", text), "-o",
+                                sandbox.folder() + "/values.so", "--compiler", "strucpp"},
+                               sandbox.folder());
+  ASSERT_TRUE(end && end->success()) << end->output;
+  InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
+  sut.wait_until_up();
+  ValueClient client(sandbox);
+  EXPECT_TRUE(eventually([&] { return client.read("one.cycles") == "129"; }));
+  for (const auto& [name, value] : {std::pair{"one.i1", "57"},
+                                    {"one.i2", "577"},
+                                    {"one.i3", "17"},
+                                    {"one.i4", "51"},
+                                    {"one.t1", "'aby'"},
+                                    {"one.t2", "'ABxyCDE'"}}) {
+    EXPECT_EQ(client.read(name), value) << name;
+  }
+}
+
+TEST_F(ValuesOfTranslatedText, ThatStrucppCannotGiveAreToldInTheirColumn) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const std::string text =
+      "TYPE Color : (red, green) := purple; END_TYPE\n"
+      "FUNCTION Join : INT VAR_INPUT a : INT := 5; END_VAR VAR_OUTPUT o : INT; END_VAR\n"
+      "VAR_INPUT b : INT := 7; END_VAR Join := a * 10 + b; o := 1; END_FUNCTION\n"
+      "FUNCTION Plain : INT VAR_INPUT a : INT := 5; END_VAR Plain := a; END_FUNCTION\n"
+      "PROGRAM Main\nVAR i : INT; t : TIME; END_VAR\n"
+      "i := Join(1);\ni := Plain() + Plain(); t := T#1_000ms;\nEND_PROGRAM\n"
+      "CONFIGURATION cell RESOURCE press ON PLC\n"
+      "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
+      "END_RESOURCE END_CONFIGURATION\n";
+  const auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", text), "-o",
+                                sandbox.folder() + "/values.so", "--compiler", "strucpp"},
+                               sandbox.folder());
+  ASSERT_TRUE(end && !end->success());
+  EXPECT_THAT(end->output, HasSubstr("values.st:1:6: PURPLE is no value of COLOR"));
+  EXPECT_THAT(end->output, HasSubstr("values.st:7:6: JOIN: STruC++ makes zeros of inputs"));
+  EXPECT_THAT(end->output, HasSubstr("values.st:8:30: STruC++ makes 0 ns of T#1_000ms"));
+}
+
 TEST_F(ValuesOfTranslatedText, OfDatesThatStrucppDoesNotConvertAreRefused) {
   need("PLCHOST_STRUCPP");
   if (IsSkipped()) return;
