@@ -91,6 +91,7 @@ Result<void> AuditLog::open_file(const std::string& path) {
   if (made) PLCHOST_TRY(check_errno(::fchmod(fd.get(), mode), "cannot set the rights of " + path));
   struct stat status{};
   PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
+  if (!S_ISREG(status.st_mode)) return failure(ErrorCode::wrong_type, path + " is no plain file");
   // Its name; also of one that a process has made that was killed then.
   PLCHOST_TRY(sync_directory(options_.folder));
   bytes_ = static_cast<std::size_t>(status.st_size);

@@ -29,14 +29,17 @@
 
 namespace {
 
-// An output that cannot be written is a failure, unless its reader has had enough.
+// An output that cannot be written is a failure, unless its reader has had enough. Another error of the
+// system tells itself what it is about.
 int carry_out(const plchost::Action& action) {
   int code = plchost::kExitFailed;
   try {
     code = action();
     errno = 0;
     if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-  } catch (const std::system_error& error) {  // of fmt::print
+  } catch (const std::system_error& error) {
+    const bool of_output = std::ferror(stdout) != 0;  // thrown by fmt::print
+    if (!of_output) return plchost::CliSession::fail({plchost::ErrorCode::system, 0, error.what()});
     errno = error.code().value();
   }
   if (errno == EPIPE) return code;

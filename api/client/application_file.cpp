@@ -34,8 +34,12 @@ Result<std::string> read_application(const std::string& path, std::string_view h
   }
   std::ifstream file(path, std::ios::binary);
   if (!file) return failure(ErrorCode::system, fmt::format("{} cannot be opened here{}", path, hint), errno);
-  std::string contents(std::istreambuf_iterator<char>(file), {});
-  if (file.bad()) return failure(ErrorCode::system, "cannot read " + path, errno);
+  std::string contents;
+  try {
+    contents.assign(std::istreambuf_iterator<char>(file), {});
+  } catch (const std::system_error& problem) {  // thrown by the buffer of the stream
+    return failure(ErrorCode::system, "cannot read " + path, problem.code().value());
+  }
   if (contents.empty()) return failure(ErrorCode::wrong_size, path + " is empty");
   return contents;
 }

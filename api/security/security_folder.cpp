@@ -153,8 +153,10 @@ Validity validity_for(int days) {
 }
 
 Result<void> SecurityFolder::init(const std::string& folder, const std::string& host) {
+  if (folder.empty()) return failure(ErrorCode::invalid_argument, "DIR is empty: name the folder to be made");
   std::error_code error;
   const std::string path = fs::absolute(folder, error).lexically_normal().string();
+  if (error) return failure(ErrorCode::system, folder + " has no absolute path here", error.value());
   if (fs::exists(path, error) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
     return failure(ErrorCode::already_exists,
                    fmt::format("{} is there already and is no empty folder; nothing was changed", path));

@@ -20,7 +20,8 @@ namespace plchost {
 
 namespace {
 
-// not_found: there is none, or no folder of ours. refused: it is another user's.
+// not_found: there is none, or no folder of ours. wrong_type: it is no plain file. refused: it is another
+// user's.
 Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!fd) {
@@ -33,7 +34,8 @@ Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
   }
   struct stat status{};
   PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "cannot examine " + path));
-  if (!S_ISREG(status.st_mode) || (status.st_uid != ::geteuid() && status.st_uid != 0)) {
+  if (!S_ISREG(status.st_mode)) return failure(ErrorCode::wrong_type, path + " is no plain file");
+  if (status.st_uid != ::geteuid() && status.st_uid != 0) {
     return failure(ErrorCode::refused,
                    fmt::format("{} is no file of this user, but of user {}", path, status.st_uid));
   }

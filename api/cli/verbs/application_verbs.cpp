@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -58,8 +59,16 @@ int send(CliSession& session, const LoadArguments& arguments) {
 }
 
 int load(CliSession& session, const LoadArguments& arguments) {
+  if (arguments.file.empty()) {
+    return CliSession::fail({ErrorCode::invalid_argument, 0, "FILE is empty: name the application's file"});
+  }
   if (!arguments.on_host) return send(session, arguments);
-  const std::string path = std::filesystem::absolute(arguments.file).lexically_normal();
+  std::error_code error;
+  const std::string path = std::filesystem::absolute(arguments.file, error).lexically_normal();
+  if (error) {
+    return CliSession::fail({ErrorCode::system, error.value(),
+                             fmt::format("FILE '{}' has no absolute path here", arguments.file)});
+  }
   return command(
       session,
       {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path, arguments.boot, arguments.online},

@@ -109,6 +109,15 @@ int list_objects(CliSession& session, const ListArguments& arguments) {
   return kExitDone;
 }
 
+// To the host, an empty name stands for all objects.
+Result<std::string> host_of_object(CliSession& session, const std::string& name) {
+  if (name.empty()) {
+    return failure(ErrorCode::invalid_argument,
+                   "NAME is empty: name one object; 'plcctl list objects' lists all");
+  }
+  return session.target_host();
+}
+
 Result<ListedObject> look_at(CliSession& session, const std::string& host, const std::string& name) {
   PLCHOST_TRY_ASSIGN(auto listing, session.client().value()->list_objects(
                                        host, {.name = name, .type = std::nullopt, .match = {}, .after = {}},
@@ -119,7 +128,7 @@ Result<ListedObject> look_at(CliSession& session, const std::string& host, const
 }
 
 int show_object(CliSession& session, const std::string& name) {
-  const auto host = session.target_host();
+  const auto host = host_of_object(session, name);
   if (!host) return CliSession::fail(host.error());
   const auto object = look_at(session, *host, name);
   if (!object) return CliSession::fail(object.error());
@@ -164,7 +173,7 @@ void print_look(const CliSession& session, const std::string& name, const Object
 
 int watch_object(CliSession& session, const WatchObjectArguments& arguments) {
   catch_interrupts();
-  const auto host = session.target_host();
+  const auto host = host_of_object(session, arguments.name);
   if (!host) return CliSession::fail(host.error());
   const auto interval =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.interval_s));

@@ -97,6 +97,10 @@ int watch_transitions(CliSession& session, const TransitionArguments& arguments)
   catch_interrupts();
   const auto is_wanted = wanted(session, arguments);
   if (!is_wanted) return CliSession::fail(is_wanted.error());
+  if (!arguments.instance.empty()) {
+    if (const auto known = session.check_instance(arguments.instance); !known)
+      return CliSession::fail(known.error());
+  }
   ControlClient& client = *session.client().value();
   std::uint64_t shown = 0;
   while (!interrupted()) {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -116,7 +117,13 @@ int unforce(CliSession& session, UnforceArguments arguments) {
     return CliSession::fail(
         {ErrorCode::invalid_argument, 0, "name the variables that are to be forced no longer, or say --all"});
   }
-  if (arguments.all) arguments.which.names.emplace_back("*");
+  constexpr std::string_view kAllForced = "*";  // to the instance
+  std::vector<std::string>& names = arguments.which.names;
+  if (std::ranges::find(names, kAllForced) != names.end()) {
+    return CliSession::fail(
+        {ErrorCode::invalid_argument, 0, "'*' is no variable; --all ends the forcing of all"});
+  }
+  if (arguments.all) names.emplace_back(kAllForced);
   return command_for_each(session, ControlVerb::unforce_variable, arguments.which);
 }
 

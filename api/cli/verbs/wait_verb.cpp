@@ -68,8 +68,10 @@ Result<void> wait_until(CliSession& session, const WaitArguments& arguments, Tim
   PLCHOST_TRY_ASSIGN(const auto host, host_until(session, end));
   PLCHOST_TRY_ASSIGN(const auto instances, expand(session, arguments.names));
   std::vector<Awaited> awaited;
-  for (const NamedInstance& one : instances)
+  for (const NamedInstance& one : instances) {
+    if (std::ranges::find(awaited, one.name, &Awaited::name) != awaited.end()) continue;
     awaited.push_back({.name = one.name, .state = {}, .problem = {}});
+  }
   for (;;) {
     const auto looked = look(session, host, arguments.state, awaited);
     const TimePoint now = MonotonicClock::now();

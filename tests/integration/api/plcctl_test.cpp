@@ -181,6 +181,14 @@ TEST_F(Plcctl, WaitsForTheStateOfInstances) {
   EXPECT_EQ(run({"wait", "instance", "line1", "--for", "happy"}).code, 2);
 }
 
+TEST_F(Plcctl, WaitsOnceForAnInstanceThatIsNamedTwice) {
+  for (const char* const again : {"line1", "l*"}) {
+    const auto twice = run({"wait", "instance", "line1", again});
+    EXPECT_EQ(twice.code, 0) << twice.errors;
+    EXPECT_EQ(twice.output, "line1: running\n");
+  }
+}
+
 TEST_F(Plcctl, CompletesTheNamesThatThereAre) {
   const auto offered = [&](std::vector<std::string> words) {
     words.insert(words.begin(),
@@ -346,6 +354,20 @@ TEST_F(Plcctl, SaysWhichFileItCannotSend) {
   EXPECT_THAT(run({"load", "application", "line1", host_.run_directory()}).errors, HasSubstr("is a folder"));
 }
 
+TEST_F(Plcctl, NamesTheFileThatItCannotRead) {
+  const auto unread = run({"load", "application", "line1", "/proc/self/mem"});
+  EXPECT_EQ(unread.code, 1);
+  EXPECT_THAT(unread.errors, HasSubstr("cannot read /proc/self/mem"));
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--on-host"}}) {
+    std::vector<std::string> words{"load", "application", "line1", ""};
+    words.insert(words.end(), more.begin(), more.end());
+    const auto unnamed = run(words);
+    EXPECT_EQ(unnamed.code, 2);
+    EXPECT_THAT(unnamed.errors, HasSubstr("FILE is empty"));
+  }
+  EXPECT_TRUE(host_.requests().empty());
+}
+
 TEST_F(Plcctl, RollsBackAndChoosesTheBootApplication) {
   EXPECT_EQ(run({"rollback", "application", "line1", "--boot"}).code, 0);
   EXPECT_EQ(run({"load", "application", "line1", "/opt/a.so", "--on-host", "--boot"}).code, 0);
@@ -388,6 +410,33 @@ TEST_F(Plcctl, WatchesAsOftenAsAsked) {
   EXPECT_EQ(blocks, 3U);
 }
 
+TEST_F(Plcctl, WatchesNothingThatThereIsNot) {
+  for (const char* const what : {"tasks", "transitions"}) {
+    // Without an end of its own, a watch would last as long as the test.
+    const auto refused = run({"watch", what, "lin1", "--count", "1"});
+    EXPECT_EQ(refused.code, 1) << what;
+    EXPECT_THAT(refused.errors, HasSubstr("did you mean 'line1'?"));
+  }
+}
+
+TEST_F(Plcctl, AsksForTheNameOfAnObject) {
+  for (const char* const verb : {"show", "watch"}) {
+    const auto unnamed = run({verb, "object", ""});
+    EXPECT_EQ(unnamed.code, 2) << verb;
+    EXPECT_THAT(unnamed.errors, HasSubstr("NAME is empty"));
+  }
+}
+
+TEST_F(Plcctl, EndsAllForcesOnlyWhereAllIsSaid) {
+  const auto pattern = run({"unforce", "variable", "line1", "Main.a", "*"});
+  EXPECT_EQ(pattern.code, 2);
+  EXPECT_THAT(pattern.errors, HasSubstr("--all"));
+  EXPECT_TRUE(host_.requests().empty());
+  EXPECT_EQ(run({"unforce", "variable", "line1", "--all"}).code, 0);
+  ASSERT_EQ(host_.requests().size(), 1U);
+  EXPECT_EQ(host_.requests()[0].argument, "*");
+}
+
 TEST_F(Plcctl, AsksWhichHostWhenThereAreSeveral) {
   TestHost other(domain_, "hostb");
   other.start_server();
@@ -410,6 +459,12 @@ TEST(PlcctlAlone, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run_plcctl(1, {"list"}).code, 2);
   EXPECT_EQ(run_plcctl(1, {"post", "event", "noslash"}).code, 2);
   EXPECT_EQ(run_plcctl(1, {"post", "event", "a/b", "--count", "0"}).code, 2);
+}
+
+TEST(PlcctlAlone, MakesNoIdentitiesInAFolderWithoutAName) {
+  const auto unnamed = run_plcctl(1, {"security", "init", ""});
+  EXPECT_EQ(unnamed.code, 2);
+  EXPECT_THAT(unnamed.errors, HasSubstr("DIR is empty"));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "api/audit/audit_check.hpp"
 #include "api/audit/audit_file.hpp"
@@ -99,6 +100,16 @@ TEST_F(AuditLogTest, IsForTheGroupWhereTheFolderIs) {
   ASSERT_TRUE(log->append(stop_of("line1")));
   EXPECT_EQ(rights(log->head().number),
             fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read | fs::perms::group_write);
+}
+
+TEST_F(AuditLogTest, RefusesWhatIsNoPlainFile) {
+  std::filesystem::create_directories(folder);
+  const std::string path = folder + "/" + audit_file_name(1);
+  ASSERT_EQ(::mkfifo(path.c_str(), S_IRUSR | S_IWUSR), 0);
+  const auto log = AuditLog::open({.folder = folder});
+  ASSERT_FALSE(log);
+  EXPECT_EQ(log.error().code, ErrorCode::wrong_type);
+  EXPECT_THAT(log.error().message, HasSubstr(path + " is no plain file"));
 }
 
 TEST_F(AuditLogTest, IsOneChainOverSeveralLivesOfItsWriter) {

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "manager/store/wish_memory.hpp"
 #include "shm/base/crc32c.hpp"
@@ -172,7 +173,15 @@ TEST_F(WishStoreTest, RefusesADamagedFile) {
 
 TEST_F(WishStoreTest, RefusesWhatIsNoPlainFile) {
   std::filesystem::create_directories(file());
-  EXPECT_FALSE(sut_->find());
+  const auto folder = sut_->find();
+  ASSERT_FALSE(folder);
+  EXPECT_THAT(folder.error().message, HasSubstr(file() + " is no plain file"));
+  std::filesystem::remove(file());
+  ASSERT_EQ(::mkfifo(file().c_str(), S_IRUSR | S_IWUSR), 0);
+  make();
+  const auto fifo = sut_->find();
+  ASSERT_FALSE(fifo);
+  EXPECT_THAT(fifo.error().message, HasSubstr(file() + " is no plain file"));
 }
 
 TEST_F(WishStoreTest, TellsWhatCannotBeWrittenAndWritesItWhenItCan) {
