@@ -25,6 +25,7 @@
 #include "instances/adapters/matiec/statements.hpp"
 #include "instances/adapters/matiec/temporaries.hpp"
 #include "instances/adapters/matiec/unknown_values.hpp"
+#include "instances/adapters/matiec/uses.hpp"
 #include "instances/adapters/translator.hpp"
 
 namespace plchost {
@@ -56,7 +57,11 @@ class MatiecTranslator : public Translator {
         refused = matiec::explained(std::move(refused), context_.sources, context_.project);
       std::ranges::move(refused, std::back_inserter(context_.report.problems));
     }
-    if (context_.good() && context_.project.configurations.size() == 1) check_file_names();
+    if (context_.good() && context_.project.configurations.size() == 1) {
+      check_file_names();
+      std::ranges::move(matiec::blank_unused_pragmas(context_.sources),
+                        std::back_inserter(context_.report.remarks));
+    }
     matiec::resolve_bounds(context_.project);
     matiec::mark_references(context_.project);
     // Errors of the sources count more than a configuration that is missing.
