@@ -39,6 +39,19 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
   return !error && std::ranges::mismatch(inside, there).in1 == inside.end();
 }
 
+/// The lines to write for the first program; empty: there is none.
+std::string proposed_configuration(const iec::Project& project) {
+  const auto program = std::ranges::find(project.pous, iec::Pou::Kind::program, &iec::Pou::kind);
+  if (program == project.pous.end()) return "";
+  return fmt::format(
+      ". Write these lines in a source of the build:\n"
+      "  CONFIGURATION config0 RESOURCE resource0 ON PLC\n"
+      "    TASK task0 (INTERVAL := T#20ms, PRIORITY := 1);\n"
+      "    PROGRAM instance0 WITH task0 : {};\n"
+      "  END_RESOURCE END_CONFIGURATION",
+      program->name);
+}
+
 class Build {
  public:
   explicit Build(const BuildOrder& order) : order_(order), context_(order) {}
@@ -131,8 +144,8 @@ class Build {
       context_.fail(
           {{context_.sources.front().file, 0, 0},
            fmt::format("there is no CONFIGURATION in {}; an application has one, which says what its "
-                       "tasks are",
-                       names_of_sources())});
+                       "tasks are{}",
+                       names_of_sources(), proposed_configuration(context_.project))});
     } else if (all.size() != 1) {
       context_.fail(
           {all[1].place, fmt::format("the sources have {} CONFIGURATIONs, of which the first one is {}; "

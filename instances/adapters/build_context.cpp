@@ -58,8 +58,10 @@ std::optional<ProgramEnd> BuildContext::run(const char* what, const std::vector<
   } else if (end->cancelled) {
     fail("interrupted: nothing was built");
   } else if (end->over_limit) {
-    fail(fmt::format("{} has run for {} s and was ended; make the program smaller, or use a faster machine",
-                     what, std::chrono::duration_cast<std::chrono::seconds>(limit).count()));
+    fail(
+        fmt::format("{} has run for {} s and was ended; try again when the machine is not busy, or make the "
+                    "program smaller",
+                    what, std::chrono::duration_cast<std::chrono::seconds>(limit).count()));
   } else {
     return *std::move(end);
   }

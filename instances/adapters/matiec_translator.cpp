@@ -155,11 +155,11 @@ class MatiecTranslator : public Translator {
 
   bool run() {
     namespace fs = std::filesystem;
-    std::vector<std::string> command{fs::absolute(compiler_.program), "-f", "-p", "-l"};
+    std::vector<std::string> command{fs::absolute(compiler_.program), "-f", "-l"};
     if (!add_options(command)) return false;
     command.insert(command.end(), {"-O", "l", "-I", fs::absolute(compiler_.library), "-T", ".",
                                    std::string(matiec::kJoinedFile)});
-    const auto end = context_.run("iec2c", command, context_.order.translate_limit);
+    const auto end = translated_by(command);
     if (!end) return false;
     if (!end->success()) {
       std::ranges::move(matiec::taken_variables(context_.project, context_.sources, compiler_.library),
@@ -182,6 +182,20 @@ class MatiecTranslator : public Translator {
       context_.fail("iec2c has failed:" + first_lines(end->output));
     }
     return context_.good() && context_.has(context_.folder().check_room());
+  }
+
+  // With -p, iec2c knows POUs and types before their declaration. It then reads its own library with their
+  // names, too, and takes its variables M, P, IN and others for them. So it gets -p only if it needs to.
+  std::optional<ProgramEnd> translated_by(const std::vector<std::string>& command) {
+    const auto run_with = [&](std::vector<std::string> words, bool looks_ahead) {
+      if (looks_ahead) words.insert(words.begin() + 1, "-p");
+      return context_.run("iec2c", words, context_.order.translate_limit);
+    };
+    if (!matiec::declares_before_use(context_.sources)) return run_with(command, true);
+    auto end = run_with(command, false);
+    if (!end || end->success()) return end;
+    auto other = run_with(command, true);
+    return !other || other->success() ? other : end;
   }
 
   // Of references and of bounds that are constants, if this iec2c knows them. References take the words REF,

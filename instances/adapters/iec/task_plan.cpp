@@ -172,6 +172,11 @@ class Planner {
                       variable.name, variable.location, kind_of(*pou), compiler()));
     if (!place) return wrong(place.error());
     const std::string type = folded(variable.type);
+    if (bytes_of_type(type) == 0)
+      return wrong(
+          fmt::format("{} at {} is of type {}: only BOOL, integers, bit strings, REAL and LREAL "
+                      "can be located; write one of these types itself",
+                      variable.name, variable.location, variable.type));
     if (bytes_of_type(type) != place->bytes || (place->bit >= 0) != (type == "BOOL"))
       return wrong(fmt::format("{} does not fit into {}", variable.type, variable.location));
     if (compiler_ != Compiler::matiec) return;

@@ -205,6 +205,7 @@ iec::SourceProblems taken_variables(const iec::Project& project, std::span<const
     for (const iec::Resource& resource : configuration.resources) check_all(resource.globals);
   }
   for (const iec::DeclaredType& type : project.types) {
+    check(type.name, type.place);
     if (!is_enumeration(type)) continue;
     for (const iec::Token& value : values_of(type, sources)) check(value.text, value.place);
   }
@@ -224,7 +225,9 @@ iec::SourceProblems problems_of(std::string_view output, const JoinedSource& sou
     for (const std::string& word : words_in(fs::path(library) / message.file, message.line)) {
       const auto declared = std::ranges::find(names, word, &Declared::name);
       if (declared == names.end()) continue;
-      add_once({declared->place, taken_text(declared->written)}, problems);
+      add_once(
+          {declared->place, taken_text(declared->written) + ", or declare each POU and type before its use"},
+          problems);
     }
   }
   return problems;

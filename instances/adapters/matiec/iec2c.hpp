@@ -37,8 +37,8 @@ inline constexpr std::string_view kJoinedFile = "joined.st";
 /// The names of the POUs in that library, folded.
 [[nodiscard]] std::set<std::string> names_of_library(const std::string& library);
 
-/// Variables and values of enumerations that are called as a POU of that library. iec2c refuses them in other
-/// words.
+/// Variables, types and values of enumerations that are called as a POU of that library. iec2c refuses them
+/// in other words.
 [[nodiscard]] iec::SourceProblems taken_variables(const iec::Project& project,
                                                   std::span<const iec::Source> sources,
                                                   const std::string& library);

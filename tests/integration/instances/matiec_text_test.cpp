@@ -208,6 +208,32 @@ TEST_P(DebuggedByMatiec, KnowsTheWordsOfReferencesOnlyInProgramsThatHaveSome) {
   EXPECT_TRUE(soon("press1.dref", "3"));
 }
 
+TEST_P(DebuggedByMatiec, KnowsPousThatAreCalledAsVariablesOfItsLibrary) {
+  std::string text = std::string(
+                         "FUNCTION_BLOCK M VAR_OUTPUT n : INT; END_VAR n := n + 1; END_FUNCTION_BLOCK "
+                         "PROGRAM Press VAR one : M; count : INT; END_VAR one(); count := one.n; "
+                         "END_PROGRAM") +
+                     kEnd;
+  ASSERT_NO_FATAL_FAILURE(run(text));
+  EXPECT_TRUE(eventually([&] { return std::stoi(values_->read("press1.count")) > 3; }));
+}
+
+// The editors of Beremiz and OpenPLC write it into each program.
+TEST_P(DebuggedByMatiec, LeavesOutTheCodeInPragmasThatNoProgramUses) {
+  const std::string logger = R"(FUNCTION_BLOCK LOGGER
+  VAR_INPUT TRIG : BOOL; MSG : STRING; END_VAR
+  IF TRIG THEN
+  {{
+   LogMessage((char*)GetFbVar(MSG, .body),GetFbVar(MSG, .len));
+  }}
+  END_IF;
+END_FUNCTION_BLOCK
+)";
+  ASSERT_NO_FATAL_FAILURE(run(logger + "PROGRAM Press VAR n : INT; END_VAR n := n + 1; END_PROGRAM" + kEnd));
+  EXPECT_THAT(said, HasSubstr("FUNCTION_BLOCK LOGGER is not used by a program of the CONFIGURATION"));
+  EXPECT_TRUE(eventually([&] { return std::stoi(values_->read("press1.n")) > 3; }));
+}
+
 TEST_P(DebuggedByMatiec, HasArraysWhoseBoundsAreConstants) {
   std::string text = std::string(R"(FUNCTION_BLOCK Total
   VAR_EXTERNAL CONSTANT last : INT; END_VAR

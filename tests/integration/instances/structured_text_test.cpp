@@ -354,6 +354,8 @@ TEST_F(TranslatedByMatiec, ThatIsWrongIsToldInItsOwnWords) {
               HasSubstr("twice.st:35:5: PROGRAM rest: iec2c cannot translate connections"));
   text = kTwice;
   text.replace(text.find("PROGRAM Loop"), 12, "PROGRAM P");
+  text.replace(text.find("late : TON;"), 11, "late : TON; f : Ahead;");
+  text += "FUNCTION_BLOCK Ahead VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK\n";
   EXPECT_THAT(build(text).output, HasSubstr("'P' is also a name in the library of iec2c"));
   text = std::string("FUNCTION_BLOCK Motor METHOD Go END_METHOD END_FUNCTION_BLOCK ") + kTwice;
   EXPECT_THAT(build(text).output, HasSubstr("twice.st:1:22: METHOD: MATIEC knows the second edition"));

@@ -194,6 +194,12 @@ TEST_F(BuildParts, SourcesWithoutAConfigurationAreNamed) {
     return report.problems.empty() ? "" : iec::describe(report.problems.front());
   };
   EXPECT_THAT(said({one}, "/nowhere"), HasSubstr(one + ": there is no CONFIGURATION in this file"));
+  EXPECT_THAT(said({one}, "/nowhere"), HasSubstr("Write these lines in a source of the build:\n"
+                                                 "  CONFIGURATION config0 RESOURCE resource0 ON PLC\n"
+                                                 "    TASK task0 (INTERVAL := T#20ms, PRIORITY := 1);\n"
+                                                 "    PROGRAM instance0 WITH task0 : Main;\n"
+                                                 "  END_RESOURCE END_CONFIGURATION"));
+  EXPECT_THAT(said({two}, "/nowhere"), testing::EndsWith("which says what its tasks are"));
   EXPECT_THAT(said({one, two}, "/nowhere"), HasSubstr("there is no CONFIGURATION in " + one + ", " + two));
 
   // A compiler that finds something says more.

@@ -234,6 +234,10 @@ TEST_F(MatiecGlue, RefusesATypeThatDoesNotFitIntoItsPlace) {
   const Glue glue = write(kMain, "VAR_GLOBAL go AT %IW0 : BOOL; END_VAR",
                           std::string(kFast) + "PROGRAM one WITH fast : Main;", {{"BOOL", "__IW0", "%IW0"}});
   EXPECT_THAT(texts(glue.problems), ElementsAre("c.st:2:12: BOOL does not fit into %IW0"));
+  EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL go AT %IW0 : ARRAY[0..3] OF INT; END_VAR",
+                          std::string(kFast) + "PROGRAM one WITH fast : Main;")
+                        .problems),
+              ElementsAre(HasSubstr("go at %IW0 is of type ARRAY[0..3] OF INT: only BOOL, integers")));
 }
 
 TEST_F(MatiecGlue, RefusesIntervalsThatTheInterfaceCannotHold) {

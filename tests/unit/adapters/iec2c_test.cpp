@@ -53,8 +53,9 @@ TEST(Iec2cErrors, InItsLibraryNameTheNameOfTheProgramThatItHasToo) {
   const std::string library = own_path("ieclib");
   std::ofstream(library) << "FUNCTION MAX\nVAR_INPUT P : INT; MODE : INT; END_VAR\n";
   EXPECT_THAT(told(library + ":2-11..2-12: error: invalid\n" + library + ":2-11..2-12: error: again"),
-              ElementsAre("a.st:1:9: 'P' is also a name in the library of iec2c; choose another one",
-                          "b.st:1:6: 'Mode' is also a name in the library of iec2c; choose another one"));
+              ElementsAre("a.st:1:9: 'P' is also a name in the library of iec2c; choose another one, or "
+                          "declare each POU and type before its use",
+                          HasSubstr("b.st:1:6: 'Mode' is also a name in the library of iec2c")));
   std::remove(library.c_str());
 }
 
@@ -80,13 +81,14 @@ TEST(Iec2cNames, OfItsLibraryAreToldOfVariablesAndValuesToo) {
       << "FUNCTION LEFT\nFUNCTION LIMIT\nFUNCTION_BLOCK INTEGRAL";
   const std::vector<iec::Source> sources{
       {"a.st",
-       "TYPE Way : (Ahead, Left := 5); Parts : STRUCT left : INT; END_STRUCT; END_TYPE\n"
+       "TYPE Way : (Ahead, Left := 5); Limit : INT (0..5); Parts : STRUCT left : INT; END_STRUCT; END_TYPE\n"
        "FUNCTION_BLOCK Ctl\nVAR integral : REAL; END_VAR\nEND_FUNCTION_BLOCK\n"
        "CONFIGURATION c VAR_GLOBAL limit : INT; other : INT; END_VAR END_CONFIGURATION"}};
   EXPECT_THAT(texts(taken_variables(iec::read_project(sources).project, sources, library)),
               ElementsAre("a.st:3:5: 'integral' is also a name in the library of iec2c; choose another one",
                           "a.st:5:28: 'limit' is also a name in the library of iec2c; choose another one",
-                          "a.st:1:20: 'Left' is also a name in the library of iec2c; choose another one"));
+                          "a.st:1:20: 'Left' is also a name in the library of iec2c; choose another one",
+                          "a.st:1:32: 'Limit' is also a name in the library of iec2c; choose another one"));
   std::filesystem::remove_all(library);
 }
 
