@@ -318,7 +318,7 @@ TEST_F(ManagedInstanceTest, BreaksOffWhatGoesOnWhenTheManagerEnds) {
   bring_up();
   ask(ControlVerb::stop);
   sut().shut_down();
-  EXPECT_EQ(take_reply().text, "the manager is shutting down");
+  EXPECT_EQ(take_reply().text, "the manager is shutting down; its next process begins stopped");
   EXPECT_EQ(host_.requests.back().verb, ControlVerb::shutdown);
   ask(ControlVerb::start);
   EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
