@@ -154,7 +154,7 @@ Result<std::string> Instance::attach_pool() {
   PLCHOST_TRY_ASSIGN(pool_, std::move(pool));
   host_.emplace(options_.launch.name, &*pool_);
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
-  host_->events().clear_left_behind();
+  PLCHOST_TRY(in_step("events of the process before", host_->events().clear_left_behind()));
   PLCHOST_TRY(prepare_host(start_, *host_));
   return {};
 }

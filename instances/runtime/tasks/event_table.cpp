@@ -24,8 +24,18 @@ void tell_post(std::uint32_t mark, const CountedEvent& event) noexcept {
 
 }  // namespace
 
-void EventTable::clear_left_behind() const noexcept {
-  if (pool_ != nullptr) pool_->withdraw_events(instance_);
+Result<void> EventTable::clear_left_behind() {
+  if (pool_ == nullptr) return {};
+  const std::string prefix = instance_ + "/";
+  PLCHOST_TRY_ASSIGN(const auto objects, pool_->list());
+  for (const ObjectInfo& object : objects) {
+    if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
+    PLCHOST_TRY_ASSIGN(const auto event, if_found(pool_->open_event(object.name)));
+    if (!event) continue;
+    (void)event->set_bound_tasks(0);
+    (void)event->set_registered(false);
+  }
+  return {};
 }
 
 void EventTable::withdraw_own() noexcept {

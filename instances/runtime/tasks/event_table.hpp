@@ -32,9 +32,9 @@ class EventTable {
   /// That room, for what else the start makes; null: nobody looks for it.
   [[nodiscard]] PoolRoom* room() noexcept { return room_ ? &*room_ : nullptr; }
 
-  /// Takes back the registrations and bound tasks that a process of this instance's name has left. Needs no
-  /// lock of the pool.
-  void clear_left_behind() const noexcept;
+  /// Takes back the registrations and bound tasks that a process of this instance's name has left. On failure
+  /// some may stay, and posters are told that tasks run their posts. timed_out: the pool is locked.
+  [[nodiscard]] Result<void> clear_left_behind();
   /// Takes back the registrations and bound tasks of this process. Needs no lock of the pool.
   void withdraw_own() noexcept;
 

@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 
 #include "shm/files/memory_file.hpp"
+#include "tests/support/held_pool_lock.hpp"
 #include "tests/unit/pool/create_patiently.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
@@ -116,6 +117,25 @@ TEST_F(ObjectPoolTest, ReportsThePostOfAnUnboundEventAsSoft) {
   event.set_registered(false);
   EXPECT_EQ(event.post(), PostResult::not_registered);
   EXPECT_EQ(event.bound_tasks(), 3U);
+}
+
+TEST_F(ObjectPoolTest, WithdrawsTheEventsOfOneOwnerAlsoWhileItIsLocked) {
+  auto sut = create();
+  const auto taken = [&](const std::string& name) {
+    const PoolEvent event = sut.create_event(name).value();
+    event.set_registered(true);
+    event.set_bound_tasks(1);
+    return event;
+  };
+  const PoolEvent left = taken("line1/ready");
+  const PoolEvent another = taken("line10/ready");
+  ASSERT_EQ(left.post(), PostResult::posted);
+  const HeldPoolLock held(name_.get());
+  sut.withdraw_events("line1");
+  EXPECT_EQ(left.post(), PostResult::not_registered);
+  EXPECT_EQ(left.bound_tasks(), 0U);
+  EXPECT_FALSE(left.counted().snapshot().taken());
+  EXPECT_EQ(another.post(), PostResult::posted);
 }
 
 TEST_F(ObjectPoolTest, AnEmptyHandleIsNotValid) {
