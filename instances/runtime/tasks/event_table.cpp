@@ -24,17 +24,11 @@ void tell_post(std::uint32_t mark, const CountedEvent& event) noexcept {
 
 }  // namespace
 
+// A pool that cannot be locked is met here, where the start may be repeated, and not by the application.
 Result<void> EventTable::clear_left_behind() {
   if (pool_ == nullptr) return {};
-  const std::string prefix = instance_ + "/";
-  PLCHOST_TRY_ASSIGN(const auto objects, pool_->list());
-  for (const ObjectInfo& object : objects) {
-    if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
-    PLCHOST_TRY_ASSIGN(const auto event, if_found(pool_->open_event(object.name)));
-    if (!event) continue;
-    (void)event->set_bound_tasks(0);
-    (void)event->set_registered(false);
-  }
+  PLCHOST_TRY(pool_->list());
+  pool_->withdraw_events(instance_);
   return {};
 }
 
