@@ -26,7 +26,6 @@
 #include "manager/system/oom_score.hpp"
 #include "manager/system/service_manager.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/own_folder.hpp"
@@ -36,6 +35,7 @@
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/reference_clock.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -14,13 +14,13 @@
 #include "manager/pool_rights.hpp"
 #include "manager/store/wish_memory.hpp"
 #include "manager/supervisor/instance_files.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/debug_page.hpp"
 #include "shm/pages/flight_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/outputs_page.hpp"
+#include "shm/threads/thread.hpp"
 #include "shm/variables/symbol_page.hpp"
 
 namespace plchost {

@@ -8,7 +8,7 @@
 
 #include "manager/host_check/host_files.hpp"
 #include "schedulers/policies/registry.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

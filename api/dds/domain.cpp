@@ -28,9 +28,9 @@
 #include "api/dds/steady_waits.hpp"
 #include "api/dds/token_heap.hpp"
 #include "api/security/identity.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/pages/host_words.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost::dds {
 

@@ -9,7 +9,7 @@
 
 #include "api/dds/entity.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost::dds {
 

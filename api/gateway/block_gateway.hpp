@@ -19,8 +19,8 @@
 #include "api/gateway/host_numbers.hpp"
 #include "api/gateway/pending_blocks.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/block_driver/block_router.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -20,10 +20,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/base/system_call.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/files/memory_rights.hpp"
+#include "shm/threads/process_start.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

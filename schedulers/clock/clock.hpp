@@ -8,8 +8,8 @@
 
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -12,7 +12,7 @@
 #include "schedulers/faults/cycle_gate.hpp"
 #include "schedulers/faults/task_fault.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -12,7 +12,7 @@
 #include "schedulers/supervision/watchdog_rules.hpp"
 #include "schedulers/tasks/task.hpp"
 #include "shm/base/flight_ring.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

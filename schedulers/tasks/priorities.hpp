@@ -5,7 +5,7 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "schedulers/tasks/task.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -8,7 +8,7 @@
 #include "schedulers/activation/event_poller.hpp"
 #include "schedulers/activation/scheduler.hpp"
 #include "schedulers/tick/tick_source.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

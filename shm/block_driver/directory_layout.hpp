@@ -7,10 +7,10 @@
 
 #include "shm/base/counted_event.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/process_start.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/block_driver/node_address.hpp"
 #include "shm/files/fixed_page.hpp"
+#include "shm/threads/process_start.hpp"
 
 // The directory of the nodes of a pool as it lies in shared memory. All values read here are checked before
 // they are used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel

@@ -8,10 +8,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/block_driver/directory_lock.hpp"
 #include "shm/files/fixed_page.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

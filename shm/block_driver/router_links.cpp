@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/block_driver/block_router.hpp"
 #include "shm/block_driver/routes.hpp"
 #include "shm/log/log.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

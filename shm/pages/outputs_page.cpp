@@ -13,13 +13,13 @@
 #include <unistd.h>
 
 #include "shm/base/names.hpp"
-#include "shm/base/process_start.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/fixed_page.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/files/registers.hpp"
 #include "shm/log/log.hpp"
 #include "shm/plc_process_image.h"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

@@ -8,9 +8,9 @@
 
 #include <sys/types.h>
 
-#include "shm/base/client_mutex.hpp"
 #include "shm/base/result.hpp"
 #include "shm/files/memory_rights.hpp"
+#include "shm/threads/client_mutex.hpp"
 
 namespace plchost {
 

@@ -7,8 +7,8 @@
 #include <signal.h>
 #include <sys/stat.h>
 
-#include "shm/base/thread.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

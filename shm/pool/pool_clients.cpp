@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
-#include "shm/base/process_start.hpp"
 #include "shm/base/wrapping.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

@@ -5,11 +5,11 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/process_start.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pool/client_locks.hpp"
 #include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_view.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

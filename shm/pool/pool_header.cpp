@@ -4,9 +4,9 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

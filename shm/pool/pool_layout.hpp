@@ -14,7 +14,7 @@
 #include "shm/base/counted_event.hpp"
 #include "shm/base/counting_semaphore.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/robust_mutex.hpp"
+#include "shm/threads/robust_mutex.hpp"
 
 // The pool as it lies in shared memory. Anyone with the right to map it may have scribbled in it, so whatever
 // is read here is checked before it is used, and sizes are read once, at attach. There are no pointers in it.

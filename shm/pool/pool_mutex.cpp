@@ -1,7 +1,7 @@
 #include "shm/pool/pool_mutex.hpp"
 
-#include "shm/base/process_start.hpp"
 #include "shm/pool/process_pools.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

@@ -3,9 +3,9 @@
 #include <atomic>
 #include <cstdint>
 
-#include "shm/base/client_mutex.hpp"
-#include "shm/base/robust_mutex.hpp"
 #include "shm/pool/client_locks.hpp"
+#include "shm/threads/client_mutex.hpp"
+#include "shm/threads/robust_mutex.hpp"
 
 namespace plchost {
 

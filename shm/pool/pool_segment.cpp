@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/open_or_make.hpp"
 #include "shm/files/pool_files.hpp"
@@ -16,6 +15,7 @@
 #include "shm/pool/pool_references.hpp"
 #include "shm/pool/pool_table.hpp"
 #include "shm/pool/process_pools.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

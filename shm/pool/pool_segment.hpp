@@ -12,7 +12,6 @@
 
 #include <sys/types.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/base/result.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/pool/client_locks.hpp"
@@ -23,6 +22,7 @@
 #include "shm/pool/pool_mutex.hpp"
 #include "shm/pool/pool_table.hpp"
 #include "shm/pool/pool_view.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

@@ -4,8 +4,8 @@
 
 #include <pthread.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/pool/pool_mutex.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost::bench {
 

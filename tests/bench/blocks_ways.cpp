@@ -9,9 +9,9 @@
 #include <sys/socket.h>
 #include <time.h>
 
-#include "shm/base/thread.hpp"
 #include "shm/block_driver/block_channel.hpp"
 #include "shm/block_driver/block_router.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/bench/child.hpp"
 
 namespace plchost::bench {

@@ -1,6 +1,6 @@
 // One thread at a time holds the mutex, also after its owner was killed at any instruction, or has ended.
 
-#include "shm/base/client_mutex.hpp"
+#include "shm/threads/client_mutex.hpp"
 #include "tests/models/checker/client_roll.hpp"
 #include "tests/models/checker/model.hpp"
 

@@ -1,6 +1,6 @@
 // One thread at a time holds the mutex, also after its owner was killed at any instruction.
 
-#include "shm/base/robust_mutex.hpp"
+#include "shm/threads/robust_mutex.hpp"
 #include "tests/models/checker/model.hpp"
 #include "tests/models/checker/pi_futex.hpp"
 

@@ -7,8 +7,8 @@
 #include <sched.h>
 #include <time.h>
 
-#include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

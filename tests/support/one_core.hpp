@@ -2,7 +2,7 @@
 
 #include <sched.h>
 
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

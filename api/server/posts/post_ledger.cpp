@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
-#include "shm/base/robust_mutex.hpp"
 #include "shm/base/time.hpp"
 #include "shm/files/fixed_page.hpp"
+#include "shm/threads/robust_mutex.hpp"
 
 namespace plchost {
 

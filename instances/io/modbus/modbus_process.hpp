@@ -14,7 +14,7 @@
 #include "instances/io/modbus/threads/log_pause.hpp"
 #include "instances/io/modbus/threads/stop_event.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost::modbus {
 

@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/block_driver/node_directory.hpp"
 #include "shm/log/log.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 

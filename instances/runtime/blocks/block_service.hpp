@@ -11,9 +11,9 @@
 #include "instances/plc_app.h"
 #include "instances/runtime/settings/settings.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/block_driver/block_channel.hpp"
 #include "shm/block_driver/block_router.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

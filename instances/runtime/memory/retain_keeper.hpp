@@ -18,7 +18,7 @@
 #include "instances/runtime/memory/retain_memory.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

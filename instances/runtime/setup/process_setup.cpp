@@ -10,10 +10,10 @@
 
 #include "shm/base/cpu_list.hpp"
 #include "shm/base/system_call.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/log/log.hpp"
 #include "shm/pages/instance_page.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

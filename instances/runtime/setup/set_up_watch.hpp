@@ -13,8 +13,8 @@
 #include "schedulers/faults/processor_guard.hpp"
 #include "schedulers/faults/processor_times.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

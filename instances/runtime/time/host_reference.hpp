@@ -14,7 +14,7 @@
 #include "instances/runtime/time/host_clock.hpp"
 #include "instances/runtime/time/reference.hpp"
 #include "shm/base/seqlock.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

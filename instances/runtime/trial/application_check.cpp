@@ -22,9 +22,9 @@
 #include "schedulers/task_set.hpp"
 #include "schedulers/tick/device_file.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pool/pool_room.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

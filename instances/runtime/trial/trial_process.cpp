@@ -27,10 +27,10 @@
 #include "instances/runtime/application/symbol_name.hpp"
 #include "instances/runtime/trial/trial.hpp"
 #include "schedulers/faults/fault_trap.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/process/end_with_parent.hpp"
 #include "shm/process/work_limit.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

@@ -17,7 +17,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/api/client_library.hpp"
 
 namespace plchost {

@@ -22,8 +22,8 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/sockets/packet_socket.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/receive_until.hpp"
 

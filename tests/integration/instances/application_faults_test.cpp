@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

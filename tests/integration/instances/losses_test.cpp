@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "shm/base/cpu_list.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/pages/flight_page.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "shm/base/thread.hpp"
 #include "shm/pages/exception_history.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

@@ -10,8 +10,8 @@
 #include <sys/stat.h>
 
 #include "manager/config/config_changes.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/manager/reload_fixture.hpp"
 #include "tests/support/sanitized.hpp"
 

@@ -11,10 +11,10 @@
 
 #include "manager/api_server.hpp"
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/thread.hpp"
 #include "shm/pages/exception_history.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/manager/costs_cycles.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/sanitized.hpp"

@@ -6,9 +6,9 @@
 
 #include <gmock/gmock.h>
 
-#include "shm/base/thread.hpp"
 #include "shm/block_driver/node_directory.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "shm/base/client_mutex.hpp"
+#include "shm/threads/client_mutex.hpp"
 #include "tests/models/checker/model.hpp"
 
 namespace plchost::models {

@@ -9,7 +9,7 @@
 #include <sys/syscall.h>
 #include <time.h>
 
-#include "shm/base/process_start.hpp"
+#include "shm/threads/process_start.hpp"
 #include "tests/models/checker/explorer.hpp"
 
 namespace plchost::models {

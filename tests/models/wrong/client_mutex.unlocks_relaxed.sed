@@ -1,3 +1,3 @@
-# shm/base/client_mutex.cpp: the writes under the mutex are not passed on
+# shm/threads/client_mutex.cpp: the writes under the mutex are not passed on
 # caught as: a data race: a read of the guarded value
 s/compare_exchange_weak\(word, 0, std::memory_order_release/compare_exchange_weak(word, 0, std::memory_order_relaxed/

@@ -1,4 +1,4 @@
-#include "shm/base/client_mutex.hpp"
+#include "shm/threads/client_mutex.hpp"
 
 #include <array>
 #include <atomic>
@@ -15,7 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 namespace {

@@ -1,4 +1,4 @@
-#include "shm/base/robust_mutex.hpp"
+#include "shm/threads/robust_mutex.hpp"
 
 #include <array>
 #include <chrono>
@@ -16,7 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 namespace {

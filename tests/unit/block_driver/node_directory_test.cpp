@@ -10,8 +10,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/threads/process_start.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

@@ -9,8 +9,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/thread.hpp"
 #include "shm/process/work_limit.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 namespace {

@@ -18,10 +18,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_layout.hpp"
+#include "shm/threads/process_start.hpp"
 #include "tests/support/sanitized.hpp"
 #include "tests/unit/pool/pool_storm.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"

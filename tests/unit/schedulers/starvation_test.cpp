@@ -11,7 +11,7 @@
 #include <sched.h>
 #include <unistd.h>
 
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace plchost {

@@ -1,4 +1,4 @@
-#include "shm/base/process_start.hpp"
+#include "shm/threads/process_start.hpp"
 
 #include <array>
 #include <cerrno>

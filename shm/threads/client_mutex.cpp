@@ -1,4 +1,4 @@
-#include "shm/base/client_mutex.hpp"
+#include "shm/threads/client_mutex.hpp"
 
 #include <algorithm>
 

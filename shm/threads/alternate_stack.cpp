@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 namespace plchost {
 

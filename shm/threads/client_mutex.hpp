@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "shm/base/futex.hpp"
-#include "shm/base/robust_mutex.hpp"
 #include "shm/base/time.hpp"
+#include "shm/threads/robust_mutex.hpp"
 
 namespace plchost {
 

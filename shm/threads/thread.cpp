@@ -1,4 +1,4 @@
-#include "shm/base/thread.hpp"
+#include "shm/threads/thread.hpp"
 
 #include <algorithm>
 #include <cstdint>

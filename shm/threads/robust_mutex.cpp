@@ -1,4 +1,4 @@
-#include "shm/base/robust_mutex.hpp"
+#include "shm/threads/robust_mutex.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -8,7 +8,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "shm/base/process_start.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 
