@@ -27,21 +27,22 @@ constexpr Duration kStateLimit = std::chrono::seconds(2);
 
 }  // namespace
 
-// Applications in them are run, and wishes followed. A disk that hangs is no reason to stop a plant here,
-// either.
-Result<void> Manager::check_state_folders() {
-  const HostConfig& host = config_.host;
+// Applications in them are run, and wishes followed.
+Result<void> check_state_folders(const HostConfig& host) {
   const std::vector<std::string> folders{host.state_directory, wishes_folder(host.state_directory, host.name),
                                          applications_folder(host.state_directory, host.name),
                                          exceptions_folder(host.state_directory, host.name),
                                          audit_folder(host)};
-  const auto check = [folders]() -> Result<void> {
-    for (const std::string& folder : folders) {
-      auto ours = check_own_folder(folder);
-      if (!ours && ours.error().code == ErrorCode::refused) return ours;
-    }
-    return {};
-  };
+  for (const std::string& folder : folders) {
+    auto ours = check_own_folder(folder);
+    if (!ours && ours.error().code == ErrorCode::refused) return ours;
+  }
+  return {};
+}
+
+// A disk that hangs is no reason to stop a plant here, either.
+Result<void> Manager::check_state_folders() {
+  const auto check = [host = config_.host]() -> Result<void> { return plchost::check_state_folders(host); };
   constexpr const char* kWhere = "[host] state_directory";
   const auto checked = state_disk_.ask<Result<void>>(kStateLimit, kWhere, check);
   if (!checked) {

@@ -5,6 +5,7 @@
 
 #include <sys/types.h>
 
+#include "manager/config/manager_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/process/user_account.hpp"
 
@@ -23,6 +24,10 @@ enum class GroupRight : bool { reads, writes };
 /// Gives the ledger of posts of a pool to the user that the API server is to have; nothing: that of this
 /// process. One that another user has put there is taken away, and logged. For root, while no server runs.
 void hand_over_ledger(const std::string& pool, const std::optional<UserAccount>& server);
+
+/// Whether check_own_folder() believes in the state directory of a host and in its own folders there, as far
+/// as they are there. refused: the first that it does not believe in.
+[[nodiscard]] Result<void> check_state_folders(const HostConfig& host);
 
 /// Takes all rights to a folder from all other users. Makes it if it is not there; the folder above must be.
 [[nodiscard]] Result<void> keep_folder(const std::string& path);

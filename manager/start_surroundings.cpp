@@ -10,6 +10,7 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include "manager/server_files.hpp"
 #include "manager/surroundings.hpp"
 #include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
@@ -74,6 +75,7 @@ ConfigSurroundings start_surroundings(const std::string& programs) {
   const std::string plc_instance = programs + "/plc-instance";
   ConfigSurroundings surroundings = config_surroundings();
   surroundings.check_directories = true;
+  surroundings.check_state = check_state_folders;
   surroundings.interfaces = network_interfaces();
   surroundings.check_application = [plc_instance](const HostConfig& host, const InstanceConfig& instance) {
     return try_application(plc_instance, host, instance);

@@ -78,6 +78,10 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
   SectionReader reader(table, line, "[host]", problems);
   config.host.name = surroundings.host_name;
   read_keys(host_keys(), reading(), reader, config.host);
+  if (surroundings.check_state && !reader.wrong("state_directory") && !reader.wrong("name")) {
+    if (const auto good = surroundings.check_state(config.host); !good)
+      reader.problem("state_directory", good.error().message);
+  }
   complete_cores();
 }
 

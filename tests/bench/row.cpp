@@ -178,6 +178,20 @@ std::string details(const Row& row) {
   return text;
 }
 
+/// The rounds' bounds lie so far apart that they show the machine, of whose floor they are made.
+bool bound_moves(const std::vector<Round>& rounds, std::size_t index) {
+  constexpr double kApart = 1.5;
+  double least = std::numeric_limits<double>::infinity();
+  double most = 0;
+  for (const Round& round : rounds) {
+    const Target& target = round.targets[index];
+    if (!target.decided()) continue;
+    least = std::min(least, target.bound);
+    most = std::max(most, target.bound);
+  }
+  return most > kApart * least;
+}
+
 /// The bound is one figure, the same in each round.
 bool steady(const std::vector<Round>& rounds, std::size_t index) {
   double least = std::numeric_limits<double>::infinity();
@@ -256,6 +270,8 @@ Verdict verdict_of(const Row& row, std::size_t index) {
     if (round.targets[index].decided()) ++verdict.decided;
     if (round.targets[index].met()) ++verdict.met;
   }
+  const bool agreed = verdict.met == 0 || verdict.met == verdict.decided;
+  if (!agreed && bound_moves(rounds, index)) return {};
   return verdict;
 }
 

@@ -48,7 +48,6 @@ class CheckConfig : public testing::Test {
     return fmt::format("application = \"{}\"\n", Plant::application(name));
   }
 
- private:
   std::filesystem::path folder_ = own_path("check");
 };
 
@@ -83,6 +82,22 @@ TEST_F(CheckConfig, KnowsTheInterfacesOfTheHost) {
   const std::string output = check("[dds]\ninterface = \"none0\"\nallow_unsecured = true\n");
   EXPECT_THAT(output, HasSubstr("cell.toml:6: [dds] interface: there is no interface 'none0'; there are "));
   EXPECT_THAT(output, HasSubstr("lo"));
+}
+
+// As the start says it.
+TEST_F(CheckConfig, KnowsWhoseTheFoldersOfTheHostAre) {
+  for (const char* const kind :
+       {"", "/wishes.cell1", "/audit.cell1", "/applications.cell1", "/exceptions.cell1"}) {
+    const auto folder = folder_ / ("state" + std::string(kind));
+    std::filesystem::create_directories(folder);
+    std::filesystem::permissions(folder, std::filesystem::perms::all);
+    const std::string output = check("");
+    EXPECT_THAT(output, HasSubstr("cell.toml:4: [host] state_directory: " + folder.native() + " (owner"));
+    EXPECT_THAT(output, HasSubstr("other users can put files into it"));
+    EXPECT_THAT(output, HasSubstr("exit 1"));
+    std::filesystem::remove(folder);
+  }
+  EXPECT_EQ(check(""), "cell.toml: ok, 0 instances\nexit 0\n");
 }
 
 }  // namespace

@@ -153,6 +153,20 @@ TEST(Rounds, MakeTheVerdict) {
   EXPECT_EQ(verdict_of(rounds({kNotMeasured, kNotMeasured})[0], 0).text(), "not measured");
 }
 
+TEST(Rounds, WhoseBoundsLieFarApartDecideOnlyWhatTheyAgreeOn) {
+  const auto verdict = [](const std::vector<std::pair<double, double>>& measured_and_bound) {
+    std::vector<Row> all;
+    for (const auto& [measured, bound] : measured_and_bound)
+      add_round(all, {{.name = "part/who", .targets = {{"below F", "us", measured, bound}}}});
+    return verdict_of(all[0], 0).text();
+  };
+  EXPECT_EQ(verdict({{11, 10}, {14, 15}}), "met in 1 of 2 rounds");
+  EXPECT_EQ(verdict({{11, 10}, {14, 16}}), "not measured");
+  EXPECT_EQ(verdict({{9, 10}, {30, 40}}), "met");
+  EXPECT_EQ(verdict({{11, 10}, {50, 40}}), "not met");
+  EXPECT_EQ(verdict({{11, 10}, {14, 15}, {90, kNotMeasured}}), "met in 1 of 2 rounds");
+}
+
 TEST(Rounds, FurtherApartThanTheBoundDecideNothingWhereItMustBeSteady) {
   const auto verdict = [](const std::vector<double>& measured) {
     std::vector<Row> all;
