@@ -2,7 +2,8 @@
 # All tests, from nothing: packages, gates, build, tests, sanitizers, fuzzers.
 #   tests/run.sh           everything (what CI runs)
 #   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
-#   tests/run.sh --threads  more integration tests with the thread sanitizer than everything has: by hand (README.md)
+#   tests/run.sh --threads  more integration tests with the thread sanitizer than everything has (README.md)
+#   tests/run.sh --files   clang-tidy, and each file by itself, over all of the code
 #   tests/run.sh NAME...   only tests whose name matches one of these (ctest -R), in the plain build
 #   tests/run.sh --help    this text
 # A test has one attempt, unless tests/retries.txt says why it has two. Up to three others of a build have two if the machine stood
@@ -14,13 +15,13 @@ set -uo pipefail
 cd "$(dirname "$0")/.."
 self=tests/run.sh
 case "${1:-}" in
-  "" | --quick | --threads | --step | --fuzz) ;;
+  "" | --quick | --threads | --files | --step | --fuzz) ;;
   -h | --help)
     sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$self"
     exit
     ;;
   -*)
-    echo "$self: unknown option $1; allowed are --quick, --threads and --help" >&2
+    echo "$self: unknown option $1; allowed are --quick, --threads, --files and --help" >&2
     exit 2
     ;;
 esac
@@ -173,18 +174,19 @@ count() { # adds up the summary of the step that just ran
 }
 
 # Over the product's code; the tests are compiled with all warnings as errors like everything else. clang-tidy and the check of
-# single files take too long for all of it. Each commit has an eighth, and what was changed last.
+# single files take too long for all of it. Each commit has an eighth, and what was changed last; --files has all.
+share=${PLCHOST_SHARE:-8}
 tidy() {
   configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug \
     -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON "${unity[@]}" &&
-    cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh --share 8 "$PWD/.build/tidy"
+    cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh --share "$share" "$PWD/.build/tidy"
 }
 
 # As users build: file by file.
 alone() {
   configure .build/alone -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF \
     -DPLCHOST_PYTHON=ON -DPLCHOST_MODBUS=ON -DCMAKE_BUILD_TYPE=Debug &&
-    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py --share 8 .build/alone
+    cmake --build .build/alone --target plchost_idl_generate plchost_generated plchost_headers && tests/gates/alone.py --share "$share" .build/alone
 }
 
 # One fuzzer starts a program that the plain build has made. Optimized, they would take nearly twice as long to compile.
@@ -228,6 +230,13 @@ case "${1:-}" in
     run "thread sanitizer, all tests: build" build_threads
     run "thread sanitizer, all tests" tests .build/threads "${whole[@]}"
     count
+    ;;
+  --files)
+    steps=3
+    export PLCHOST_SHARE=1
+    run "packages" .ci/packages test
+    run "clang-tidy: all" "$BASH" "$self" --step tidy
+    run "files compile by themselves: all" "$BASH" "$self" --step alone
     ;;
   "")
     run "packages" .ci/packages test

@@ -22,7 +22,7 @@ struct ConfigSurroundings {
   /// change.
   bool check_directories = false;            ///< that they are there or can be made
   std::vector<std::string> interfaces = {};  ///< of the system; empty: not checked
-  /// Whose the state directory and its folders are. Null: not checked.
+  /// Owner and mode of the state directory and its folders. Null: not checked.
   std::function<Result<void>(const HostConfig& host)> check_state = {};
   /// Of an instance that has one. Null: not checked.
   std::function<Result<void>(const HostConfig& host, const InstanceConfig& instance)> check_application = {};
