@@ -279,7 +279,7 @@ class PLCHOST_CLIENT_API Client {
   /// How blocks go from one of these nodes to another, or to other hosts.
   std::vector<Route> routes(const std::string& host = {}, const std::string& base = {});
   /// All variables that an application declares, or those like one of the patterns, by name. In a pattern '*'
-  /// is any characters, '?' one; "Grid[1,2]" is an element, "Grid[*]" each of them. Case does not count.
+  /// is any characters, '?' one; "Grid[1,2]" is an element, "Grid[*,*]" each of them. Case does not count.
   /// ClientError: not_found: no such variable, or it declares none.
   std::vector<Variable> variables(const std::string& host, const std::string& instance,
                                   const std::vector<std::string>& patterns = {});

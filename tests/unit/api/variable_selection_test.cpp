@@ -1,6 +1,8 @@
 #include "api/server/lists/variable_selection.hpp"
 
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -69,6 +71,28 @@ TEST(VariableSelection, NamesElementsAndWholeVariablesEachOnce) {
               ElementsAre("Grid[1,0]", "Grid[1,1]", "Grid[1,2]", "Grid[2,0]", "Grid[2,1]", "Grid[2,2]"));
   EXPECT_THAT(names_of(plant(), {.patterns = {"Grid"}}), ElementsAre("Grid[][]"));
   EXPECT_THAT(names_of(plant(), {.patterns = {"nothing*"}}), ElementsAre());
+}
+
+// "Grid[1,2]" is one of them.
+std::vector<std::string> examples_in(const std::string& file) {
+  std::ifstream stream(std::string(API) + "/" + file);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::vector<std::string> examples;
+  for (std::size_t at = text.find("Grid["); at != std::string::npos; at = text.find("Grid[", at + 1))
+    examples.push_back(text.substr(at, text.find(']', at) + 1 - at));
+  return examples;
+}
+
+TEST(VariableSelection, TakesTheExamplesOfItsDocuments) {
+  for (const char* const file :
+       {"control.idl", "plchost_client.hpp", "plcctl.md", "cli/verbs/variable_sampler.hpp"}) {
+    const std::vector<std::string> examples = examples_in(file);
+    EXPECT_FALSE(examples.empty()) << file;
+    for (const std::string& example : examples) {
+      const auto selection = select_variables(plant(), {.patterns = {example}});
+      EXPECT_TRUE(selection && !selection->elements.empty()) << file << ": " << example;
+    }
+  }
 }
 
 TEST(VariableSelection, RefusesANameThatIsNoVariable) {
