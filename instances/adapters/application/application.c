@@ -16,16 +16,36 @@ __attribute__((weak, visibility("hidden"))) int plchost_declare_debugging(void);
 
 static Task_Info* infos;
 
-/* The clock of IEC's timers: that of the cycle's begin, for each task its own. */
-static struct timespec* now;
-struct timespec* plchost_now(void); /* which the library of a compiler declares in its own way */
-struct timespec* plchost_now(void) {
+/* For each task its own. */
+struct task_clock {
+  struct timespec now; /* of IEC's timers: that of the cycle's begin */
+  unsigned long long first_ns;
+  unsigned long ticks;
+};
+static struct task_clock* clocks;
+static struct task_clock* current_clock(void) {
   const Task_Info* const current = plc_current_task();
-  return &now[current == NULL ? 0 : current - infos];
+  return &clocks[current == NULL ? 0 : current - infos];
+}
+
+/* Which the library of a compiler declares in its own way. */
+struct timespec* plchost_now(void);
+struct timespec* plchost_now(void) {
+  return &current_clock()->now;
+}
+unsigned long* plchost_ticks(unsigned long long tick_ns);
+unsigned long* plchost_ticks(unsigned long long tick_ns) {
+  struct task_clock* const own = current_clock();
+  const unsigned long long ns =
+      (unsigned long long)own->now.tv_sec * 1000000000ull + (unsigned long long)own->now.tv_nsec;
+  if (own->first_ns == 0) own->first_ns = ns;
+  /* Rounded from the first cycle on: one that begins a little early or late skips and repeats no tick. */
+  own->ticks = (unsigned long)(own->first_ns / tick_ns + (ns - own->first_ns + tick_ns / 2) / tick_ns);
+  return &own->ticks;
 }
 
 void plchost_begin(unsigned int number) {
-  clock_gettime(CLOCK_MONOTONIC, &now[number]);
+  clock_gettime(CLOCK_MONOTONIC, &clocks[number].now);
   plchost_take_places(&plchost_tasks[number]);
   plc_apply_forces();
 }
@@ -82,8 +102,8 @@ int CDECL plc_app_init(void) {
   static sys_setup_tasks_struct setup;
   unsigned int i;
   infos = calloc(plchost_task_count, sizeof *infos);
-  now = calloc(plchost_task_count, sizeof *now);
-  if (infos == NULL || now == NULL || !plchost_prepare_copies()) return 1;
+  clocks = calloc(plchost_task_count, sizeof *clocks);
+  if (infos == NULL || clocks == NULL || !plchost_prepare_copies()) return 1;
   plchost_bind();
   if (!plchost_declare_places() || !plchost_declare_variables() || !plchost_declare_symbols()) return 1;
   if (plchost_declare_debugging != NULL && !plchost_declare_debugging()) return 1;
@@ -104,5 +124,5 @@ void CDECL plc_app_exit(void) {
   plchost_forget_places();
   plchost_forget_variables();
   free(infos);
-  free(now);
+  free(clocks);
 }

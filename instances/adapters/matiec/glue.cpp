@@ -182,7 +182,7 @@ class Writer : public iec::GlueWriter {
     print(" use(&s);\n");
   }
   void write_binding() override {
-    print("void plchost_bind(void) {{\n  config_init__();\n{}", bindings_);
+    print("void plchost_bind(void) {{\n  plchost_set_ticktime();\n  config_init__();\n{}", bindings_);
     write_copy_bindings();
     print("}}\n");
   }

@@ -49,6 +49,21 @@ static void plchost_rtc_body__(RTC* data__) {
 }
 #define RTC_body__ plchost_rtc_body__
 
+/* Of MATIEC's runtimes, for the C in pragmas: __tick times common_ticktime__ is the time in ns, which is the
+ * clock of the task's cycle here. A pragma may declare it: extern unsigned long __tick; */
+extern unsigned long long common_ticktime__;
+unsigned long* plchost_ticks(unsigned long long tick_ns);
+static inline unsigned long* plchost_tick(void) {
+  return plchost_ticks(common_ticktime__);
+}
+#define __tick (*plchost_tick())
+
+/* iec2c has the greatest common divisor of all intervals in it. Programs divide it by a millisecond. */
+static inline void plchost_set_ticktime(void) {
+  const unsigned long long ms = 1000000;
+  if (common_ticktime__ == 0 || common_ticktime__ % ms != 0) common_ticktime__ = ms;
+}
+
 /* reference^ := value */
 #define PLCHOST_SET_REFERENCE(reference, ...) (*(reference) = (__VA_ARGS__))
 

@@ -1,6 +1,8 @@
 // Programs that only MATIEC translates: instruction lists, sequential function charts, references of its own
 // kind, and arrays whose bounds are constants.
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -232,6 +234,64 @@ END_FUNCTION_BLOCK
   ASSERT_NO_FATAL_FAILURE(run(logger + "PROGRAM Press VAR n : INT; END_VAR n := n + 1; END_PROGRAM" + kEnd));
   EXPECT_THAT(said, HasSubstr("FUNCTION_BLOCK LOGGER is not used by a program of the CONFIGURATION"));
   EXPECT_TRUE(eventually([&] { return std::stoi(values_->read("press1.n")) > 3; }));
+}
+
+// T_PLC_MS as the library OSCAT for OpenPLC has it, but for its cast to 32 bits.
+constexpr const char* kTicks = R"(FUNCTION T_PLC_MS : ULINT
+  VAR tx : ULINT; END_VAR
+  VAR_INPUT debug : BOOL; END_VAR
+  {extern unsigned long __tick;
+  extern unsigned long long common_ticktime__;
+  unsigned long long ticktime_ms = (common_ticktime__)/1000000;
+  TX = ticktime_ms * (unsigned long long)__tick}
+  T_PLC_MS := tx;
+END_FUNCTION
+FUNCTION Clock_us : ULINT
+  VAR_INPUT debug : BOOL; END_VAR
+  VAR us : ULINT; END_VAR
+  {US = __CURRENT_TIME.tv_sec * 1000000ull + __CURRENT_TIME.tv_nsec / 1000;}
+  Clock_us := us;
+END_FUNCTION
+PROGRAM Press
+  VAR ms : ULINT; ahead : LINT; good, bad : DINT; END_VAR
+  ms := T_PLC_MS(debug := FALSE);
+  ahead := ULINT_TO_LINT(ms * 1000) - ULINT_TO_LINT(Clock_us(debug := FALSE));
+  IF ahead > LEAST AND ahead < MOST THEN good := good + 1; ELSE bad := bad + 1; END_IF;
+END_PROGRAM
+CONFIGURATION cell
+  RESOURCE line ON PLC
+    TASK Main (INTERVAL := SHORT, PRIORITY := 1);
+    TASK Slow (INTERVAL := LONG, PRIORITY := 2);
+    PROGRAM press1 WITH Main : Press;
+    PROGRAM press2 WITH Slow : Press;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+std::string with(std::string text, const std::vector<std::pair<std::string, std::string>>& words) {
+  for (const auto& [word, value] : words) text.replace(text.find(word), word.size(), value);
+  return text;
+}
+
+// Ticks of 5 ms: the first one is cut, and later ones are rounded.
+TEST_P(DebuggedByMatiec, CountsTicksByTheClockOfEachTask) {
+  ASSERT_NO_FATAL_FAILURE(
+      run(with(kTicks, {{"SHORT", "T#10ms"}, {"LONG", "T#25ms"}, {"LEAST", "-8000"}, {"MOST", "3000"}})));
+  for (const std::string name : {"press1", "press2"}) {
+    EXPECT_TRUE(eventually([&] { return std::stoi(values_->read(name + ".good")) > 20; })) << name;
+    EXPECT_EQ(values_->read(name + ".bad"), "0") << values_->read(name + ".ahead");
+    EXPECT_EQ(std::stoll(values_->read(name + ".ms")) % 5, 0);
+  }
+}
+
+// The common divisor is 500 us: it would be 0 ms.
+TEST_P(DebuggedByMatiec, CountsTicksOfAMillisecondIfIntervalsHaveParts) {
+  ASSERT_NO_FATAL_FAILURE(
+      run(with(kTicks, {{"SHORT", "T#1.5ms"}, {"LONG", "T#4ms"}, {"LEAST", "-2000"}, {"MOST", "1000"}})));
+  for (const std::string name : {"press1", "press2"}) {
+    EXPECT_TRUE(eventually([&] { return std::stoi(values_->read(name + ".good")) > 100; })) << name;
+    EXPECT_EQ(values_->read(name + ".bad"), "0") << values_->read(name + ".ahead");
+  }
 }
 
 TEST_P(DebuggedByMatiec, HasArraysWhoseBoundsAreConstants) {

@@ -63,22 +63,22 @@ TEST(OutputOfACompiler, IsShownFromItsFirstErrorOn) {
 }
 
 const std::vector<iec::Source> kSources{{"a.st",
-                                         "PROGRAM p\n  {extern unsigned long __tick;\n   count = __tick;}\n "
-                                         "(* __tick *) {{ x(); }}\nEND_PROGRAM"},
-                                        {"b.st", "{ __ticks = 1; }\n{ x(); }"}};
+                                         "PROGRAM p\n  {extern unsigned long __turn;\n   count = __turn;}\n "
+                                         "(* __turn *) {{ x(); }}\nEND_PROGRAM"},
+                                        {"b.st", "{ __turns = 1; }\n{ x(); }"}};
 
 TEST(OutputOfTheLoader, NamesASymbolThatAPragmaUses) {
-  const std::string output = "/tmp/line.so cannot be loaded: /tmp/line.so: undefined symbol: __tick\n";
-  EXPECT_EQ(undefined_symbol(output), "__tick");
+  const std::string output = "/tmp/line.so cannot be loaded: /tmp/line.so: undefined symbol: __turn\n";
+  EXPECT_EQ(undefined_symbol(output), "__turn");
   EXPECT_EQ(undefined_symbol("other"), "");
   EXPECT_THAT(texts(pragmas_with(undefined_symbol(output), kSources)),
-              ElementsAre("a.st:2:25: the C in this pragma uses __tick, which plchost does not have"));
+              ElementsAre("a.st:2:25: the C in this pragma uses __turn, which plchost does not have"));
   EXPECT_THAT(pragmas_with("", kSources), IsEmpty());
 }
 
 TEST(LineOfC, IsFoundInItsPragma) {
-  EXPECT_EQ(place_in_pragma("   count = __tick;", kSources), (iec::SourcePlace{"a.st", 3, 0}));
-  EXPECT_EQ(place_in_pragma("extern unsigned long __tick;", kSources), (iec::SourcePlace{"a.st", 2, 0}));
+  EXPECT_EQ(place_in_pragma("   count = __turn;", kSources), (iec::SourcePlace{"a.st", 3, 0}));
+  EXPECT_EQ(place_in_pragma("extern unsigned long __turn;", kSources), (iec::SourcePlace{"a.st", 2, 0}));
   EXPECT_EQ(place_in_pragma("x();", kSources), std::nullopt) << "in two pragmas";
   EXPECT_EQ(place_in_pragma("", kSources), std::nullopt);
 }
