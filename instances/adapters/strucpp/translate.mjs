@@ -272,45 +272,127 @@ function textOf({ sourceSpan }) {
   return startLine === endLine ? lines[fileNumbers.get(file)]?.[startLine - 1]?.slice(startCol - 1, endCol) : undefined;
 }
 
-// The inputs that a call without names leaves out. The compiler gives them zeros, whatever their initial values are.
-function omittedInputs(call, pou) {
-  const sections = pou.varBlocks.filter((block) => ['VAR_INPUT', 'VAR_OUTPUT', 'VAR_IN_OUT'].includes(block.blockType));
-  const all = sections.flatMap((block) => block.declarations.flatMap((declaration) => declaration.names.map((name) => ({ name, block, declaration }))));
-  const omitted = all.slice(call.arguments.length);
-  const last = omitted.findLastIndex(({ block, declaration }) => block.blockType === 'VAR_INPUT' && declaration.initialValue !== undefined);
-  return omitted.slice(0, last + 1);
+const kParameters = ['VAR_INPUT', 'VAR_OUTPUT', 'VAR_IN_OUT'];
+
+// Of a function or method, in the order of their declaration.
+function parametersOf({ varBlocks }) {
+  const sections = varBlocks.filter(({ blockType }) => kParameters.includes(blockType));
+  return sections.flatMap((block) => block.declarations.flatMap((declaration) => declaration.names.map((name) => ({ name, block, declaration }))));
 }
 
-// Gives such calls these values, in the text. Returns those that need an input by its name.
-function completeCalls(ast) {
-  const functions = new Map(ast.functions.map((pou) => [pou.name.toUpperCase(), pou]));
-  const problems = [];
-  const insertions = [];
-  for (const node of nodesIn(ast)) {
-    const pou = node.kind === 'FunctionCallExpression' ? functions.get(node.functionName.toUpperCase()) : undefined;
-    if (pou === undefined || node.arguments.some((one) => one.name !== undefined)) continue;
-    const omitted = omittedInputs(node, pou);
-    if (omitted.length === 0) continue;
-    const values = omitted.map(({ block, declaration }) => (block.blockType === 'VAR_INPUT' && declaration.initialValue !== undefined ? textOf(declaration.initialValue) : undefined));
-    const { file, endLine, endCol } = node.sourceSpan;
-    const number = fileNumbers.get(file);
-    const isClosed = lines[number]?.[endLine - 1]?.[endCol - 1] === ')';
-    if (isClosed && values.every((value) => value !== undefined)) {
-      insertions.push({ number, line: endLine, column: endCol, text: `${node.arguments.length > 0 ? ', ' : ''}${values.join(', ')}` });
+// Where the parenthesis of a call closes; undefined: it has none, or what follows it has several lines.
+function endOfCall({ sourceSpan: { file, endLine, endCol } }) {
+  const number = fileNumbers.get(file);
+  const found = /\)\s*;?$/.exec(lines[number]?.[endLine - 1]?.slice(0, endCol) ?? '');
+  return found === null ? undefined : { number, line: endLine, column: found.index + 1 };
+}
+
+// Gives the inputs that calls leave out their initial values, in the text: the compiler passes zeros to functions, and to
+// methods nothing. Tells the calls that it cannot complete.
+class Calls {
+  constructor(plan) {
+    this.plan = plan;
+    this.types = new Map([...plan.ast.interfaces, ...plan.ast.functionBlocks].map((one) => [one.name.toUpperCase(), one]));
+    this.functions = new Map(plan.ast.functions.map((pou) => [pou.name.toUpperCase(), pou]));
+    this.problems = [];
+    this.insertions = [];
+    for (const { pou, body, scope, globals } of plan.bodies()) {
+      this.isSame = (name) => scope.get(name) === globals.get(name);
+      const links = new Set(); // of chains: they have the place of the whole chain
+      for (const node of nodesIn(body)) if (node.kind === 'MethodCallExpression') links.add(node).add(node.object);
+      for (const node of nodesIn(body)) {
+        const method = this.methodOf(node, pou, scope);
+        const called = node.kind === 'FunctionCallExpression' ? this.functions.get(node.functionName.toUpperCase()) : undefined;
+        if (method !== undefined) this.completeMethod(node, method, links.has(node));
+        else if (called !== undefined) this.completeFunction(node, called);
+      }
+    }
+    this.insertions.sort((one, other) => other.number - one.number || other.line - one.line || other.column - one.column);
+    // In the source, before anything is inserted.
+    this.problems = this.problems.sort(byPlace).map(inCharacters).map(inSource);
+  }
+
+  // Of a function block or an interface, or of one that it extends.
+  methodIn(type, name, depth = 0) {
+    const known = this.types.get(type?.toUpperCase());
+    if (known === undefined || depth > kMostBases) return undefined;
+    const own = known.methods.find((method) => method.name.toUpperCase() === name.toUpperCase());
+    const bases = [known.extends ?? []].flat();
+    return own ?? bases.map((base) => this.methodIn(base, name, depth + 1)).find((method) => method !== undefined);
+  }
+  // That a call in this POU means; undefined: it is no call of a method.
+  methodOf(node, pou, scope) {
+    if (node.kind === 'MethodCallExpression') return this.methodIn(this.methodOf(node.object, pou, scope)?.returnType?.name, node.methodName);
+    if (node.kind !== 'FunctionCallExpression') return undefined;
+    const [object, name] = node.functionName.toUpperCase().split('.');
+    if (name === undefined) return this.methodIn(pou.name, object);
+    if (object === 'SUPER') return this.methodIn(pou.extends, name);
+    return this.methodIn(object === 'THIS' ? pou.name : scope.get(object)?.type, name);
+  }
+
+  // The initial value as text; undefined: it has none, or one of its names means something else to the caller.
+  valueOf({ block, declaration }, called) {
+    if (block.blockType !== 'VAR_INPUT' || declaration.initialValue === undefined) return undefined;
+    const own = this.plan.scopeOf(called.varBlocks, new Map());
+    const names = [...nodesIn(declaration.initialValue)].filter(({ kind }) => kind === 'VariableExpression').map(({ name }) => name.toUpperCase());
+    return names.every((name) => this.isSame(name) && (!own.has(name) || this.plan.types.has(name))) ? textOf(declaration.initialValue) : undefined;
+  }
+
+  completeFunction(node, pou) {
+    if (node.arguments.some((one) => one.name !== undefined)) return;
+    const omitted = parametersOf(pou).slice(node.arguments.length);
+    const last = omitted.findLastIndex(({ block, declaration }) => block.blockType === 'VAR_INPUT' && declaration.initialValue !== undefined);
+    if (last < 0) return;
+    const values = omitted.slice(0, last + 1).map((one) => this.valueOf(one, pou));
+    const end = endOfCall(node);
+    if (end !== undefined && values.every((value) => value !== undefined)) {
+      this.insertions.push({ ...end, text: `${node.arguments.length > 0 ? ', ' : ''}${values.join(', ')}` });
     } else {
-      problems.push({ place: placeOf(node), text: `${pou.name}: STruC++ makes zeros of inputs that are left out here; name one, as ${omitted.at(-1).name} := ...` });
+      this.problems.push({ place: placeOf(node), text: `${pou.name}: STruC++ makes zeros of inputs that are left out here; name one, as ${omitted[last].name} := ...` });
     }
   }
-  insertions.sort((one, other) => other.number - one.number || other.line - one.line || other.column - one.column);
-  const added = insertions.map((one) => ({ ...one, place: inSource(inCharacters({ place: [one.number, one.line, one.column] })).place }));
-  for (const { number, line, column, text, place } of added) {
-    const before = lines[number][line - 1];
-    lines[number][line - 1] = before.slice(0, column - 1) + text + before.slice(column - 1);
-    sources[number].text = lines[number].join('\n');
-    sources[number].inserted = [...(sources[number].inserted ?? []), { line, column: place[2], length: [...text].length }];
-    sources[number].inserted.sort((one, other) => one.line - other.line || one.column - other.column);
+
+  // The compiler passes its arguments in the order of the call, whatever their names are.
+  completeMethod(node, method, isInChain) {
+    const tell = (text) => this.problems.push({ place: placeOf(node), text: `${method.name}: ${text}` });
+    const parameters = parametersOf(method);
+    const given = node.arguments.filter(({ name }) => !['EN', 'ENO'].includes(name?.toUpperCase()));
+    const numbers = given.map(({ name }, i) => (name === undefined ? i : parameters.findIndex((one) => one.name.toUpperCase() === name.toUpperCase())));
+    const unknown = numbers.findIndex((number) => number < 0 || number >= parameters.length);
+    if (unknown >= 0) return tell(given[unknown].name === undefined ? 'this call has more arguments than the method has parameters' : `it has no parameter ${given[unknown].name}`);
+    if (numbers.some((number, i) => i > 0 && number <= numbers[i - 1])) {
+      return tell(`STruC++ ignores the names in a call of a method; write them in the order of the declaration: ${parameters.map(({ name }) => name).join(', ')}`);
+    }
+    const areNamed = given.some(({ name }) => name !== undefined);
+    const end = endOfCall(node);
+    const values = parameters.map((one, i) => (numbers.includes(i) || end === undefined || isInChain ? undefined : this.valueOf(one, method)));
+    const missing = parameters.find((one, i) => !numbers.includes(i) && values[i] === undefined);
+    if (missing !== undefined) {
+      return tell(`STruC++ wants each parameter in this call of a method; add ${missing.name} ${missing.block.blockType === 'VAR_OUTPUT' ? '=>' : ':='} ...`);
+    }
+    const texts = values.map((value, i) => (value === undefined || !areNamed ? value : `${parameters[i].name} := ${value}`));
+    const between = (first, next) => texts.slice(first, next);
+    numbers.forEach((number, i) => {
+      const [file, line, column] = placeOf(given[i]);
+      const before = between((numbers[i - 1] ?? -1) + 1, number);
+      if (before.length > 0) this.insertions.push({ number: file, line, column, text: `${before.join(', ')}, ` });
+    });
+    const behind = between((numbers.at(-1) ?? -1) + 1);
+    if (behind.length > 0) this.insertions.push({ ...end, text: `${node.arguments.length > 0 ? ', ' : ''}${behind.join(', ')}` });
   }
-  return { isChanged: insertions.length > 0, problems: problems.sort(byPlace) };
+
+  // Changes the text. Returns whether there was something to change.
+  insertAll() {
+    const added = this.insertions.map((one) => ({ ...one, place: inSource(inCharacters({ place: [one.number, one.line, one.column] })).place }));
+    for (const { number, line, column, text, place } of added) {
+      const before = lines[number][line - 1];
+      lines[number][line - 1] = before.slice(0, column - 1) + text + before.slice(column - 1);
+      sources[number].text = lines[number].join('\n');
+      sources[number].inserted = [...(sources[number].inserted ?? []), { line, column: place[2], length: [...text].length }];
+      sources[number].inserted.sort((one, other) => one.line - other.line || one.column - other.column);
+    }
+    return added.length > 0;
+  }
 }
 
 // The default of an enumeration's TYPE, which the compiler drops: in C++ it becomes that of its class. Arrays and aliases
@@ -568,12 +650,22 @@ class Plan {
     return this.scopeOf(pou.varBlocks, base === undefined ? globals : this.scopeOfBlock(base, globals, depth + 1));
   }
 
-  // The compiler refuses a constant as the target of a statement only if the POU itself declares it as one.
-  checkConstants() {
+  // Each body, with its POU and the variables that it can name.
+  *bodies() {
     const sections = [...this.ast.configurations.flatMap((one) => one.varBlocks), ...this.ast.globalVarBlocks];
     const globals = this.scopeOf(sections, new Map());
+    for (const pou of [...this.ast.programs, ...this.ast.functionBlocks, ...this.ast.functions]) {
+      const scope = this.scopeOfBlock(pou, globals);
+      yield { pou, body: pou.body, scope, globals };
+      for (const method of pou.methods ?? []) yield { pou, body: method.body, scope: this.scopeOf(method.varBlocks, scope), globals };
+      for (const property of pou.properties ?? []) yield { pou, body: [property.getter, property.setter], scope, globals };
+    }
+  }
+
+  // The compiler refuses a constant as the target of a statement only if the POU itself declares it as one.
+  checkConstants() {
     const problems = [];
-    const check = (body, scope) => {
+    for (const { body, scope } of this.bodies()) {
       for (const node of nodesIn(body)) {
         for (const target of this.writtenBy(node, scope)) {
           const { kind, name, accessChain, isDereference } = target;
@@ -582,12 +674,6 @@ class Plan {
           problems.push({ place: placeOf(target), text: `${asWritten(target, name)} is CONSTANT, and STruC++ would write it; write another variable` });
         }
       }
-    };
-    for (const pou of [...this.ast.programs, ...this.ast.functionBlocks, ...this.ast.functions]) {
-      const scope = this.scopeOfBlock(pou, globals);
-      check(pou.body, scope);
-      for (const method of pou.methods ?? []) check(method.body, this.scopeOf(method.varBlocks, scope));
-      for (const property of pou.properties ?? []) check([property.getter, property.setter], scope);
     }
     return problems.sort(byPlace);
   }
@@ -604,7 +690,7 @@ class Plan {
     const name = node.functionName.toUpperCase();
     const called = this.blocks.get(scope.get(name)?.type) ?? this.ast.functions.find((one) => one.name.toUpperCase() === name);
     const namesOf = (sections) => sections.flatMap(({ declarations }) => declarations.flatMap(({ names }) => names.map((one) => one.toUpperCase())));
-    const ofCaller = called?.varBlocks.filter(({ blockType }) => ['VAR_INPUT', 'VAR_OUTPUT', 'VAR_IN_OUT'].includes(blockType)) ?? [];
+    const ofCaller = called?.varBlocks.filter(({ blockType }) => kParameters.includes(blockType)) ?? [];
     const parameters = namesOf(ofCaller);
     const written = new Set(namesOf(ofCaller.filter(({ blockType }) => blockType === 'VAR_IN_OUT')));
     return node.arguments.filter((one, i) => one.isOutput || written.has(one.name?.toUpperCase() ?? parameters[i])).map((one) => one.value);
@@ -857,8 +943,8 @@ function bounded(messages) {
 }
 
 let result = translate();
-const calls = result.success ? completeCalls(result.ast) : { isChanged: false, problems: [] };
-if (calls.isChanged) result = translate();
+const calls = result.success ? new Calls(new Plan(result)) : undefined;
+if (calls?.insertAll() === true) result = translate();
 const plan = {
   format: 1,
   problems: result.success ? [] : bounded(result.errors.map(message)),
@@ -877,7 +963,7 @@ if (result.success) {
   plan.pous = found.pous();
   plan.types = found.typeList();
   plan.configurations = found.configurations();
-  plan.problems.push(...enumerations.problems, ...calls.problems);
+  plan.problems.push(...enumerations.problems);
   plan.problems.push(...found.checkWhatIsDropped(), ...found.checkLiterals(await timesOfCompiler()), ...found.checkTimes(), ...found.checkConstants());
   for (const { number, line, name, location, isTaken } of places.values()) {
     if (isTaken !== true) plan.problems.push({ place: [number, line, 0], text: `${name} AT ${location}: the declaration is not understood` });
@@ -906,6 +992,6 @@ if (result.success) {
   writeFileSync('debug_table.cpp', table, { flag: 'wx' });
   writeFileSync('debug_map.json', JSON.stringify(result.debugMap ?? {}), { flag: 'wx' });
 }
-plan.problems = plan.problems.map(inCharacters).map(inSource);
+plan.problems = [...plan.problems.map(inCharacters).map(inSource), ...(calls?.problems ?? [])];
 plan.remarks = plan.remarks.map(inCharacters).map(inSource);
 writeFileSync('plan.json', JSON.stringify(plan), { flag: 'wx' });

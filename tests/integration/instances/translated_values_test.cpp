@@ -200,6 +200,94 @@ TEST_F(ValuesOfTranslatedText, OfInputsThatACallLeavesOutAreInitialOnesByStrucpp
   }
 }
 
+TEST_F(ValuesOfTranslatedText, OfInputsThatACallOfAMethodLeavesOutAreInitialOnesByStrucpp) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const std::string text =
+      "TYPE Mode : (idle, busy); END_TYPE\n"
+      "FUNCTION_BLOCK Base\nVAR_OUTPUT own : INT; END_VAR\n"
+      "METHOD PUBLIC Join : INT VAR_INPUT a : INT := 5; b : INT := 7; END_VAR Join := a * 10 + b; "
+      "END_METHOD\n"
+      "METHOD PUBLIC Inner : INT Inner := Join() + THIS.Join(1); THIS.Join(); END_METHOD\n"
+      "METHOD PUBLIC Wait : TIME VAR_INPUT now : Mode := Mode.busy; END_VAR VAR_IN_OUT count : DINT; "
+      "END_VAR\n"
+      "VAR_INPUT pause : TIME := T#3s; END_VAR VAR_OUTPUT again : TIME; END_VAR count := count + 1; again := "
+      "pause; IF now = Mode.busy THEN Wait := pause; END_IF; END_METHOD\n"
+      "own := Join(b := 1);\nEND_FUNCTION_BLOCK\n"
+      "FUNCTION_BLOCK Heir EXTENDS Base\n"
+      "METHOD PUBLIC Above : INT Above := SUPER^.Join(2); END_METHOD\nSUPER^();\nEND_FUNCTION_BLOCK\n"
+      "FUNCTION Ask : INT VAR_INPUT b : INT; END_VAR VAR asked : Base; END_VAR Ask := asked.Join(b); "
+      "END_FUNCTION\n"
+      "PROGRAM Main\nVAR heir1 : Heir; i1, i2, i3, i4, i5, i6, i7 : INT; cycles : DINT; t1, t2 : TIME; "
+      "END_VAR\n"
+      "heir1(); heir1.Join();\n"
+      "i1 := heir1.Join(); i2 := heir1.Join(heir1.Join()); i3 := heir1.Join(b := 1); i4 := heir1.Join(a := "
+      "1);\n"
+      "i5 := heir1.Inner(); i6 := heir1.Above(); i7 := Ask(3);\n"
+      "t1 := heir1.Wait(count := cycles, again => t2);\nEND_PROGRAM\n"
+      "CONFIGURATION cell RESOURCE press ON PLC\n"
+      "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
+      "END_RESOURCE END_CONFIGURATION\n";
+  const auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", text), "-o",
+                                sandbox.folder() + "/values.so", "--compiler", "strucpp"},
+                               sandbox.folder());
+  ASSERT_TRUE(end && end->success()) << end->output;
+  InstanceProcess sut(sandbox, std::vector<std::string>{"--application", sandbox.folder() + "/values.so"});
+  sut.wait_until_up();
+  ValueClient client(sandbox);
+  EXPECT_TRUE(eventually([&] { return client.read("one.cycles") != "0"; }));
+  for (const auto& [name, value] : {std::pair{"one.i1", "57"},
+                                    {"one.i2", "577"},
+                                    {"one.i3", "51"},
+                                    {"one.i4", "17"},
+                                    {"one.i5", "74"},
+                                    {"one.i6", "27"},
+                                    {"one.i7", "37"},
+                                    {"one.heir1.own", "51"},
+                                    {"one.t1", "T#3s"},
+                                    {"one.t2", "T#3s"}}) {
+    EXPECT_EQ(client.read(name), value) << name;
+  }
+}
+
+// By itself it passes the arguments in the order of the call: without a word, if their number and types fit.
+TEST_F(ValuesOfTranslatedText, OfMethodsThatStrucppCannotPassAreRefusedAtTheirPlace) {
+  need("PLCHOST_STRUCPP");
+  if (IsSkipped()) return;
+  const std::string text =
+      "FUNCTION_BLOCK Base\nVAR own : INT; limit : INT := 3; END_VAR\n"
+      "METHOD PUBLIC Join : INT VAR_INPUT a : INT := 5; b : INT := 7; END_VAR Join := a * 10 + b; "
+      "END_METHOD\n"
+      "METHOD PUBLIC Need : INT VAR_INPUT a : INT; END_VAR VAR_OUTPUT o : INT; END_VAR Need := a; "
+      "END_METHOD\n"
+      "METHOD PUBLIC Next : Base VAR_INPUT a : INT := 5; END_VAR own := a; END_METHOD\n"
+      "METHOD PUBLIC Most : INT VAR_INPUT a : INT := limit; END_VAR Most := a; END_METHOD\n"
+      "own := 1;\nEND_FUNCTION_BLOCK\n"
+      "PROGRAM Main\nVAR b : Base; i, limit : INT; END_VAR\n"
+      "i := b.Join(b := 1) + b.Join(b := 2, a := 3);\n"
+      "i := b.Need(o => i);\ni := b.Need(1);\ni := b.Join(c := 1);\ni := b.Join(1, 2, 3);\n"
+      "i := b.Next().Join(1, 2);\ni := b.Most();\nb.Next(1).Join(1, 2);\nEND_PROGRAM\n"
+      "CONFIGURATION cell RESOURCE press ON PLC\n"
+      "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
+      "END_RESOURCE END_CONFIGURATION\n";
+  const auto end = run_program({PLCCTL, "build", "application", sandbox.write("values.st", text), "-o",
+                                sandbox.folder() + "/values.so", "--compiler", "strucpp"},
+                               sandbox.folder());
+  ASSERT_TRUE(end && !end->success());
+  for (const char* const told :
+       {"values.st:11:23: JOIN: STruC++ ignores the names in a call of a method; write them in the order of "
+        "the declaration: A, B",
+        "values.st:12:6: NEED: STruC++ wants each parameter in this call of a method; add A := ...",
+        "values.st:13:6: NEED: STruC++ wants each parameter in this call of a method; add O => ...",
+        "values.st:14:6: JOIN: it has no parameter C",
+        "values.st:15:6: JOIN: this call has more arguments than the method has parameters",
+        "values.st:16:6: NEXT: STruC++ wants each parameter in this call of a method; add A := ...",
+        "values.st:17:6: MOST: STruC++ wants each parameter in this call of a method; add A := ..."}) {
+    EXPECT_THAT(end->output, HasSubstr(told));
+  }
+  EXPECT_THAT(end->output, Not(HasSubstr("values.st:18:")));
+}
+
 TEST_F(ValuesOfTranslatedText, ThatStrucppCannotGiveAreToldInTheirColumn) {
   need("PLCHOST_STRUCPP");
   if (IsSkipped()) return;
@@ -209,7 +297,7 @@ TEST_F(ValuesOfTranslatedText, ThatStrucppCannotGiveAreToldInTheirColumn) {
       "VAR_INPUT b : INT := 7; END_VAR Join := a * 10 + b; o := 1; END_FUNCTION\n"
       "FUNCTION Plain : INT VAR_INPUT a : INT := 5; END_VAR Plain := a; END_FUNCTION\n"
       "PROGRAM Main\nVAR i : INT; t : TIME; END_VAR\n"
-      "i := Join(1);\ni := Plain() + Plain(); t := T#1_000ms;\nEND_PROGRAM\n"
+      "i := Plain() + Join(1);\ni := Plain() + Plain(); t := T#1_000ms;\nEND_PROGRAM\n"
       "CONFIGURATION cell RESOURCE press ON PLC\n"
       "TASK fast (INTERVAL := T#2ms, PRIORITY := 1); PROGRAM one WITH fast : Main;\n"
       "END_RESOURCE END_CONFIGURATION\n";
@@ -218,7 +306,7 @@ TEST_F(ValuesOfTranslatedText, ThatStrucppCannotGiveAreToldInTheirColumn) {
                                sandbox.folder());
   ASSERT_TRUE(end && !end->success());
   EXPECT_THAT(end->output, HasSubstr("values.st:1:6: PURPLE is no value of COLOR"));
-  EXPECT_THAT(end->output, HasSubstr("values.st:7:6: JOIN: STruC++ makes zeros of inputs"));
+  EXPECT_THAT(end->output, HasSubstr("values.st:7:16: JOIN: STruC++ makes zeros of inputs"));
   EXPECT_THAT(end->output, HasSubstr("values.st:8:30: STruC++ makes 0 ns of T#1_000ms"));
 }
 
