@@ -31,16 +31,22 @@ void observe_all(Scene& scene, Shared& shared, std::initializer_list<unsigned> a
 }
 
 template <std::memory_order kStore, std::memory_order kLoad>
-void store_buffering(Scene& scene, std::initializer_list<unsigned> allowed) {
+void store_buffering(Scene& scene, std::initializer_list<unsigned> allowed, ThreadOptions options = {}) {
   auto& shared = scene.make<Shared>();
-  scene.thread("left", [&] {
-    shared.x.store(1, kStore);
-    shared.a = shared.y.load(kLoad);
-  });
-  scene.thread("right", [&] {
-    shared.y.store(1, kStore);
-    shared.b = shared.x.load(kLoad);
-  });
+  scene.thread(
+      "left",
+      [&] {
+        shared.x.store(1, kStore);
+        shared.a = shared.y.load(kLoad);
+      },
+      options);
+  scene.thread(
+      "right",
+      [&] {
+        shared.y.store(1, kStore);
+        shared.b = shared.x.load(kLoad);
+      },
+      options);
   observe_all(scene, shared, allowed);
 }
 void store_buffering_relaxed(Scene& scene) {
@@ -51,6 +57,41 @@ void store_buffering_acquire(Scene& scene) {
 }
 void store_buffering_total(Scene& scene) {
   store_buffering<kTotal, kTotal>(scene, {1, 2, 3});
+}
+
+// Threads of one core take turns, whatever the orders are.
+void store_buffering_on_one_core(Scene& scene) {
+  store_buffering<kRelaxed, kRelaxed>(scene, {1, 2, 3}, {.core = 0});
+}
+
+// A thread of another core sees their stores in any order.
+void message_from_one_core(Scene& scene) {
+  auto& shared = scene.make<Shared>();
+  scene.thread("x", [&] { shared.x.store(1, kRelaxed); }, {.core = 0});
+  scene.thread("y, if it sees x",
+               [&] {
+                 if (shared.x.load(kRelaxed) == 1) shared.y.store(1, kRelaxed);
+               },
+               {.core = 0});
+  scene.thread("reader", [&] {
+    shared.a = shared.y.load(kRelaxed);
+    shared.b = shared.x.load(kRelaxed);
+  });
+  observe_all(scene, shared, {0, 1, 2, 3});
+}
+
+// Between two steps of a thread no other one of its core runs: so a plain access there is no data race.
+void plain_counts_on_one_core(Scene& scene) {
+  auto& shared = scene.make<Shared>();
+  for (const char* const name : {"left", "right"}) {
+    scene.thread(name,
+                 [&] {
+                   shared.x.fetch_add(1, kRelaxed);
+                   ++shared.c;
+                 },
+                 {.core = 0});
+  }
+  scene.at_end([&] { require(shared.c == 2 && shared.x.load() == 2, "a lost addition"); });
 }
 
 template <std::memory_order kStore, std::memory_order kLoad>
@@ -190,6 +231,9 @@ int main(int argc, char** argv) {
              {{"store_buffering_relaxed", store_buffering_relaxed},
               {"store_buffering_acquire", store_buffering_acquire},
               {"store_buffering_total", store_buffering_total},
+              {"store_buffering_on_one_core", store_buffering_on_one_core},
+              {"message_from_one_core", message_from_one_core},
+              {"plain_counts_on_one_core", plain_counts_on_one_core},
               {"message_released", message_released},
               {"message_not_released", message_not_released},
               {"message_not_acquired", message_not_acquired},

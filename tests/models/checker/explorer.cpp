@@ -53,7 +53,7 @@ bool Explorer::next() {
   return true;
 }
 
-Report Explorer::explore() {
+Report Explorer::explore(std::uint64_t most) {
   explorer() = this;
   Report report;
   do {
@@ -62,9 +62,9 @@ Report Explorer::explore() {
     report.cut += cut_ ? 1 : 0;
     report.longest = std::max(report.longest, static_cast<unsigned>(decisions_.size()));
     if (fault_.empty() && states_.size() > kMaxStates) fault_ = "more states than the checker can hold";
-  } while (fault_.empty() && next());
+  } while (fault_.empty() && report.executions < most && next());
   report.states = states_.size();
-  if (fault_.empty() && expected_ != 0 && expected_ != observed_)
+  if (fault_.empty() && report.executions < most && expected_ != 0 && expected_ != observed_)
     report.fault = "the outcomes are " + text_of(observed_) + ", not " + text_of(expected_);
   tell_fault(report);
   explorer() = nullptr;
@@ -104,6 +104,7 @@ ThreadNumber Explorer::thread(const char* name, std::function<void()> body, Thre
   thread.history = 0;
   thread.begun = false;
   thread.next_at = kAnywhere;
+  if (options.core >= 0) memory_.run_on(count_, static_cast<unsigned>(options.core));
   return count_++;
 }
 
@@ -198,9 +199,17 @@ std::uint64_t Explorer::state() const {
   return mix(hash, left_.spurious_wakes << 8U | left_.weak_failures << 4U | left_.early_timeouts);
 }
 
+// A thread that does not share the core may see in which order two steps were done there.
+bool Explorer::core_is_seen(int core) const {
+  bool is_seen = false;
+  for (unsigned i = 0; i < count_; ++i) is_seen = is_seen || threads_[i].options.core != core;
+  return core >= 0 && is_seen;
+}
+
 bool Explorer::depend(unsigned a, unsigned b) const {
   const Thread& one = threads_[a];
   const Thread& other = threads_[b];
+  if (core_is_seen(one.options.core) && one.options.core == other.options.core) return true;
   if (one.next_at == kAnywhere || other.next_at == kAnywhere) return true;
   return one.next_at == other.next_at && (one.next_writes || other.next_writes);
 }

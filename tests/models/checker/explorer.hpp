@@ -36,7 +36,8 @@ struct Report {
 class Explorer final : public Scene, private Chooser {
  public:
   explicit Explorer(void (*set_up)(Scene&));
-  Report explore();
+  /// All executions, or the first ones: enough for a small scene.
+  Report explore(std::uint64_t most = ~std::uint64_t{0});
   /// So many executions with decisions by chance, until one of them has a fault. Finds most faults long
   /// before a search in depth comes to them; proves nothing if it finds none.
   Report walk(std::uint64_t executions);
@@ -108,6 +109,7 @@ class Explorer final : public Scene, private Chooser {
   [[nodiscard]] std::uint64_t state() const;
   [[nodiscard]] bool decide(Action& action);
   [[nodiscard]] std::uint32_t worth_running();
+  [[nodiscard]] bool core_is_seen(int core) const;
   [[nodiscard]] bool depend(unsigned a, unsigned b) const;
   void perform(const Action& action);
   void resume(unsigned number);

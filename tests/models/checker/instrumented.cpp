@@ -212,6 +212,17 @@ void* __wrap_memset(void* to, int value, std::size_t size) {
   return __real_memset(to, value, size);
 }
 
+// C code of a scene has its memory in the arena, too.
+void* __real_calloc(std::size_t count, std::size_t size);
+void* __wrap_calloc(std::size_t count, std::size_t size) {
+  if (!Arena::is_in_use()) return __real_calloc(count, size);
+  return Arena::take(count * size, alignof(std::max_align_t));  // all zero
+}
+void __real_free(void* taken);
+void __wrap_free(void* taken) {
+  if (!Arena::holds(number(taken))) __real_free(taken);
+}
+
 // The clock of a scene stands still: an execution depends on nothing but the decisions.
 int __real_clock_gettime(clockid_t clock, timespec* time);
 int __wrap_clock_gettime(clockid_t clock, timespec* time) {

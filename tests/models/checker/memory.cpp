@@ -23,6 +23,8 @@ void Memory::reset() {
   threads_ = {};
   for (std::size_t i = 0; i < kMaxThreads; ++i)
     threads_[i].now.clock[i] = 1;  // its actions before its first step
+  core_of_.fill(-1);
+  cores_ = {};
   ended_.reset();
   learnable_.reset();
   for (std::size_t i = 0; i < used_; ++i) locations_[i].order.clear();
@@ -41,6 +43,7 @@ void Memory::each_view(Function use) {
     use(thread.acquired);
     use(thread.released);
   }
+  for (View& core : cores_) use(core);
   for (std::size_t i = 0; i < used_; ++i) {
     for (Store& store : locations_[i].order) use(store.released);
   }
@@ -62,11 +65,26 @@ std::size_t Memory::index_of(std::uintptr_t address, std::size_t size) {
   return used_++;
 }
 
+void Memory::run_on(unsigned thread, unsigned core) {
+  core_of_[thread] = static_cast<int>(core);
+  core_view(thread).join(threads_[thread].now);
+}
+
 // The clock of a thread is odd between its steps, and even in one. A plain access between two steps is known
 // to a thread that synchronises with the later one, not with the earlier one.
-std::size_t Memory::begin(unsigned thread, std::uintptr_t address, std::size_t size) {
+void Memory::begin_step(unsigned thread) noexcept {
   ThreadView& self = threads_[thread];
   self.now.clock[thread] = static_cast<std::uint16_t>(2U * ++self.step);
+  if (core_of_[thread] >= 0) self.now.join(core_view(thread));
+}
+
+void Memory::end_step(unsigned thread) noexcept {
+  ++threads_[thread].now.clock[thread];
+  if (core_of_[thread] >= 0) core_view(thread) = threads_[thread].now;
+}
+
+std::size_t Memory::begin(unsigned thread, std::uintptr_t address, std::size_t size) {
+  begin_step(thread);
   const std::size_t at = index_of(address, size);
   std::vector<Store>& order = locations_[at].order;
   if (const std::uint64_t value = peek(address, size); value != order.back().value) {
@@ -220,7 +238,7 @@ bool Memory::compare_exchange(unsigned thread, std::uintptr_t address, std::size
 
 void Memory::fence(unsigned thread, Order order) {
   ThreadView& self = threads_[thread];
-  self.now.clock[thread] = static_cast<std::uint16_t>(2U * ++self.step);
+  begin_step(thread);
   if (acquires(order)) self.now.join(self.acquired);
   if (releases(order)) self.released = self.now;
   end_step(thread);
@@ -280,7 +298,7 @@ void Memory::catch_up(unsigned thread) noexcept {
 
 void Memory::pass_lock(unsigned thread, std::uintptr_t address) {
   ThreadView& self = threads_[thread];
-  self.now.clock[thread] = static_cast<std::uint16_t>(2U * ++self.step);
+  begin_step(thread);
   auto lock = std::ranges::find(locks_, address, &Lock::address);
   if (lock == locks_.end()) lock = locks_.insert(lock, {.address = address, .view = {}});
   self.now.join(lock->view);

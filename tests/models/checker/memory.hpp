@@ -92,10 +92,14 @@ class Memory {
   /// The kernel's lock of a futex: a thread that takes it has the knowledge of the one before it.
   void pass_lock(unsigned thread, std::uintptr_t address);
 
+  /// `thread` shares a core: the kernel's switch to it passes on all that the others have done there.
+  void run_on(unsigned thread, unsigned core);
+
   /// `thread` begins, and knows all that `other` has done.
   void begin_after(unsigned thread, unsigned other) {
     ended_.reset(thread);
     threads_[thread].now.join(threads_[other].now);
+    if (core_of_[thread] >= 0) core_view(thread).join(threads_[thread].now);
   }
   /// `thread` has seen that `other` has ended, and knows all that it has done.
   void learn(unsigned thread, unsigned other) { threads_[thread].now.join(threads_[other].now); }
@@ -153,10 +157,15 @@ class Memory {
   [[nodiscard]] unsigned oldest_readable(std::size_t at) const;
   template <class Function>
   void each_view(Function use);
-  void end_step(unsigned thread) noexcept { ++threads_[thread].now.clock[thread]; }
+  void begin_step(unsigned thread) noexcept;
+  void end_step(unsigned thread) noexcept;
+  View& core_view(unsigned thread) noexcept { return cores_[static_cast<std::size_t>(core_of_[thread])]; }
+  [[nodiscard]] const View& seen_by(std::size_t thread) const noexcept;
 
   Chooser& chooser_;
   std::array<ThreadView, kMaxThreads> threads_;
+  std::array<int, kMaxThreads> core_of_{};  // of a thread; -1: its own
+  std::array<View, kMaxThreads> cores_;     // the view of the thread that ran there last
   std::bitset<kMaxThreads> ended_;
   std::bitset<kMaxThreads> learnable_;
   std::vector<Location> locations_;

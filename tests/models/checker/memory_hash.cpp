@@ -2,11 +2,17 @@
 
 namespace plchost::models {
 
+// A thread sees in its next step all that was done on its core.
+const View& Memory::seen_by(std::size_t thread) const noexcept {
+  const int core = core_of_[thread];
+  return core < 0 ? threads_[thread].now : cores_[static_cast<std::size_t>(core)];
+}
+
 // The oldest store that any thread can still read. All stores before it can be forgotten.
 unsigned Memory::oldest_readable(std::size_t at) const {
   unsigned oldest = ~0U;
   for (std::size_t i = 0; i < kMaxThreads; ++i) {
-    if (!ended_.test(i)) oldest = std::min<unsigned>(oldest, threads_[i].now.rank[at]);
+    if (!ended_.test(i)) oldest = std::min<unsigned>(oldest, seen_by(i).rank[at]);
   }
   return std::min<unsigned>(oldest, static_cast<unsigned>(locations_[at].order.size()) - 1);
 }
@@ -20,7 +26,7 @@ std::uint64_t Memory::hash() const {
   for (std::size_t i = 0; i < kMaxThreads; ++i) {
     known[i] = 0xffff;
     for (std::size_t t = 0; t < kMaxThreads; ++t) {
-      if (!ended_.test(t)) known[i] = std::min(known[i], threads_[t].now.clock[i]);
+      if (!ended_.test(t)) known[i] = std::min(known[i], seen_by(t).clock[i]);
     }
   }
   const auto hash_of = [&](const View& view, std::uint64_t what) {
@@ -39,10 +45,10 @@ std::uint64_t Memory::hash() const {
     if (ended_.test(i) && !learnable_.test(i)) continue;
     const ThreadView& thread = threads_[i];
     const std::uint64_t self = mix(0x7468, i);
-    sum += mix(mix(self, thread.step), hash_of(thread.now, self));
+    sum += mix(mix(self, thread.step), hash_of(seen_by(i), self));
     if (ended_.test(i)) continue;
     View acquired = thread.acquired;
-    acquired.join(thread.now);
+    acquired.join(seen_by(i));
     sum += mix(hash_of(acquired, self + 1), hash_of(thread.released, self + 2));
   }
   for (std::size_t i = 0; i < used_; ++i) {

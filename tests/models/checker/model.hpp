@@ -33,6 +33,8 @@ struct Limits {
 struct ThreadOptions {
   bool may_be_killed = false;
   int after = -1;  ///< the number of the thread whose end it waits for, and then knows all that it has done
+  int core =
+      -1;  ///< threads of one core take turns there, and each knows all that was done on it; -1: its own
 };
 
 class Scene {
