@@ -39,17 +39,18 @@ static struct area* area_of(const struct plchost_place* place) {
   return &areas[i];
 }
 
-/* Values lie at multiples of their size, places do not. */
+/* Values lie at multiples of their size, places do not. A task that sees what another one has written sees
+ * all that this one has done before. */
 static unsigned long long value_at(const void* value, unsigned int bytes) {
   switch (bytes) {
     case 1:
-      return __atomic_load_n((const unsigned char*)value, __ATOMIC_RELAXED);
+      return __atomic_load_n((const unsigned char*)value, __ATOMIC_ACQUIRE);
     case 2:
-      return __atomic_load_n((const unsigned short*)value, __ATOMIC_RELAXED);
+      return __atomic_load_n((const unsigned short*)value, __ATOMIC_ACQUIRE);
     case 4:
-      return __atomic_load_n((const unsigned int*)value, __ATOMIC_RELAXED);
+      return __atomic_load_n((const unsigned int*)value, __ATOMIC_ACQUIRE);
     default:
-      return __atomic_load_n((const unsigned long long*)value, __ATOMIC_RELAXED);
+      return __atomic_load_n((const unsigned long long*)value, __ATOMIC_ACQUIRE);
   }
 }
 static unsigned long long value_of(const struct plchost_place* place, const void* value) {
@@ -59,16 +60,16 @@ static unsigned long long value_of(const struct plchost_place* place, const void
 static void set_value(void* value, unsigned int bytes, unsigned long long now) {
   switch (bytes) {
     case 1:
-      __atomic_store_n((unsigned char*)value, (unsigned char)now, __ATOMIC_RELAXED);
+      __atomic_store_n((unsigned char*)value, (unsigned char)now, __ATOMIC_RELEASE);
       break;
     case 2:
-      __atomic_store_n((unsigned short*)value, (unsigned short)now, __ATOMIC_RELAXED);
+      __atomic_store_n((unsigned short*)value, (unsigned short)now, __ATOMIC_RELEASE);
       break;
     case 4:
-      __atomic_store_n((unsigned int*)value, (unsigned int)now, __ATOMIC_RELAXED);
+      __atomic_store_n((unsigned int*)value, (unsigned int)now, __ATOMIC_RELEASE);
       break;
     default:
-      __atomic_store_n((unsigned long long*)value, now, __ATOMIC_RELAXED);
+      __atomic_store_n((unsigned long long*)value, now, __ATOMIC_RELEASE);
   }
 }
 /* Unless another task has changed it meanwhile: then 0. */
@@ -113,9 +114,9 @@ static void store(const struct plchost_place* place, unsigned char* area, unsign
   } else if (place->bit < 0) {
     memcpy(byte, &value, place->bytes);
   } else if (value != 0) {
-    __atomic_fetch_or(byte, (unsigned char)(1u << place->bit), __ATOMIC_RELAXED);
+    __atomic_fetch_or(byte, (unsigned char)(1u << place->bit), __ATOMIC_ACQ_REL);
   } else {
-    __atomic_fetch_and(byte, (unsigned char)~(1u << place->bit), __ATOMIC_RELAXED);
+    __atomic_fetch_and(byte, (unsigned char)~(1u << place->bit), __ATOMIC_ACQ_REL);
   }
 }
 
@@ -125,33 +126,31 @@ static void find_areas(unsigned char* found[AREAS]) {
   for (i = 0; i < AREAS; ++i) found[i] = areas[i].bytes == 0 ? NULL : plc_area_address(areas[i].handle);
 }
 
-/* Unless a task that came between has exchanged another one. */
-static void exchange(unsigned int number, unsigned long long last, unsigned long long now) {
-  __atomic_compare_exchange_n(&plchost_exchanged[number], &last, now, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST);
+/* Unless a task that came between has exchanged another one: then 0. */
+static int exchange(unsigned int number, unsigned long long last, unsigned long long now) {
+  return __atomic_compare_exchange_n(&plchost_exchanged[number], &last, now, 0, __ATOMIC_SEQ_CST,
+                                     __ATOMIC_SEQ_CST);
+}
+static unsigned long long exchanged(unsigned int number) {
+  return __atomic_load_n(&plchost_exchanged[number], __ATOMIC_SEQ_CST);
 }
 
-/* A value that is none of before is one that a task has assigned and not put yet. */
-static void take_memory(struct plchost_use* use, const unsigned char* area) {
-  const struct plchost_place* const place = &plchost_places[use->place];
-  const unsigned long long last = __atomic_load_n(&plchost_exchanged[use->place], __ATOMIC_SEQ_CST);
-  const unsigned long long before = value_at(place->value, place->bytes);
-  const unsigned long long now = load(place, area);
-  if (now != last && value_of(place, &before) == last &&
-      set_value_if(place->value, place->bytes, before, now))
-    exchange(use->place, last, now);
-  use->before = value_of(place, place->value);
+/* The phases of a task. It takes, and puts, the places one after the other. */
+enum { OUTSIDE = 0, TAKES = 1, IN_CYCLE = 2, PUTS = 4 };
+static unsigned char* phases = NULL; /* of each task */
+static unsigned char* left = NULL;   /* for each place: cycles whose tasks have left it to another one */
+#define MOST_LEFT 200                /* that one may have been stopped in its cycle, by a fault */
+
+static void set_phase(const struct plchost_task* task, unsigned char phase) {
+  __atomic_store_n(&phases[task - plchost_tasks], phase, __ATOMIC_SEQ_CST);
 }
 
-static unsigned char* in_cycle = NULL; /* of each task */
-static unsigned char* left = NULL;     /* for each place: cycles whose tasks have left it to another one */
-#define MOST_LEFT 200                  /* that one may have been stopped in its cycle, by a fault */
-
-static int others_use(const struct plchost_task* task, unsigned int place) {
+static int another_is_in(int any_of, const struct plchost_task* task, unsigned int place) {
   unsigned int i;
   unsigned int j;
   for (i = 0; i < plchost_task_count; ++i) {
     const struct plchost_task* const other = &plchost_tasks[i];
-    if (other == task || !__atomic_load_n(&in_cycle[i], __ATOMIC_SEQ_CST)) continue;
+    if (other == task || (__atomic_load_n(&phases[i], __ATOMIC_SEQ_CST) & any_of) == 0) continue;
     for (j = 0; j < other->uses_count; ++j) {
       if (other->uses[j].place == place) return 1;
     }
@@ -159,22 +158,44 @@ static int others_use(const struct plchost_task* task, unsigned int place) {
   return 0;
 }
 
-/* A value that this task has not changed is that of another one, which may be in the midst of its cycle, or
- * of an operator. */
-static int leaves(const struct plchost_task* task, unsigned int place) {
-  if (!others_use(task, place)) return 0;
+static int leaves(const struct plchost_task* task, unsigned int place, int any_of) {
+  if (!another_is_in(any_of, task, place)) return 0;
   return __atomic_add_fetch(&left[place], 1, __ATOMIC_RELAXED) <= MOST_LEFT;
 }
 
-/* First into the area: a task that comes between the two takes what is there already. */
+/* If the program's value is not the one that was exchanged last, a task has assigned it and not put it yet.
+ * While another task puts, the value in the area may be older than the program's. The new value counts as
+ * exchanged before the program has it: then a task that comes between knows the old one for unchanged. */
+static void take_memory(const struct plchost_task* task, struct plchost_use* use, const unsigned char* area) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  const unsigned long long last = exchanged(use->place);
+  const unsigned long long before = value_at(place->value, place->bytes);
+  const unsigned long long now = load(place, area);
+  if (now != last && value_of(place, &before) == last && !leaves(task, use->place, PUTS)) {
+    set_phase(task, TAKES);
+    __atomic_store_n(&left[use->place], 0, __ATOMIC_RELAXED);
+    if (exchange(use->place, last, now)) set_value_if(place->value, place->bytes, before, now);
+    set_phase(task, IN_CYCLE);
+  }
+  use->before = value_of(place, place->value);
+}
+
+/* A value that this task has not changed is that of another one, which may be in the midst of its cycle, or
+ * of an operator. While another task takes, the program may still have the value of before. If another task
+ * puts between the store and the exchange, its value is newer, and the one in the area is replaced again. */
 static void put_memory(const struct plchost_task* task, const struct plchost_use* use, unsigned char* area) {
   const struct plchost_place* const place = &plchost_places[use->place];
-  const unsigned long long last = __atomic_load_n(&plchost_exchanged[use->place], __ATOMIC_SEQ_CST);
-  const unsigned long long value = value_of(place, place->value);
-  if (value == last || (value == use->before && leaves(task, use->place))) return;
-  __atomic_store_n(&left[use->place], 0, __ATOMIC_RELAXED);
-  store(place, area, value);
-  exchange(use->place, last, value);
+  int is_old = 0; /* the value in the area */
+  for (;;) {
+    const unsigned long long last = exchanged(use->place);
+    const unsigned long long value = value_of(place, place->value);
+    const int others = value == use->before ? TAKES | IN_CYCLE : TAKES;
+    if (!is_old && (value == last || leaves(task, use->place, others))) return;
+    if (exchanged(use->place) != last || value_of(place, place->value) != value) continue;
+    __atomic_store_n(&left[use->place], 0, __ATOMIC_RELAXED);
+    store(place, area, value);
+    is_old = !exchange(use->place, last, value);
+  }
 }
 
 /* An online change: this program takes over from one that runs. */
@@ -210,14 +231,14 @@ void plchost_take_places(const struct plchost_task* task) {
     find_exchanged();
     __atomic_store_n(&is_known, 1, __ATOMIC_SEQ_CST);
   }
-  __atomic_store_n(&in_cycle[task - plchost_tasks], 1, __ATOMIC_SEQ_CST);
+  set_phase(task, IN_CYCLE);
   find_areas(found);
   for (i = 0; i < task->uses_count; ++i) {
     struct plchost_use* const use = &task->uses[i];
     const struct plchost_place* const place = &plchost_places[use->place];
     const unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
-      take_memory(use, area);
+      take_memory(task, use, area);
     } else if (place->area == 'I' || place->aliased) {
       use->before = load(place, area);
       set_value(use->value, place->bytes, use->before);
@@ -228,7 +249,7 @@ void plchost_take_places(const struct plchost_task* task) {
 void plchost_put_places(const struct plchost_task* task) {
   unsigned char* found[AREAS];
   unsigned int i;
-  __atomic_store_n(&in_cycle[task - plchost_tasks], 0, __ATOMIC_SEQ_CST);
+  set_phase(task, PUTS);
   find_areas(found);
   for (i = 0; i < task->uses_count; ++i) {
     const struct plchost_use* const use = &task->uses[i];
@@ -240,6 +261,7 @@ void plchost_put_places(const struct plchost_task* task) {
       put_output(use, area);
     }
   }
+  set_phase(task, OUTSIDE);
 }
 
 void plchost_exchange_places(const struct plchost_task* task) {
@@ -248,6 +270,7 @@ void plchost_exchange_places(const struct plchost_task* task) {
   unsigned int i;
   find_areas(found);
   for (step = 0; step < 2; ++step) { /* all of them are put before any is taken */
+    set_phase(task, step == 0 ? PUTS : IN_CYCLE);
     for (i = 0; i < task->uses_count; ++i) {
       struct plchost_use* const use = &task->uses[i];
       const struct plchost_place* const place = &plchost_places[use->place];
@@ -257,7 +280,7 @@ void plchost_exchange_places(const struct plchost_task* task) {
         if (step == 0)
           put_memory(task, use, area);
         else
-          take_memory(use, area);
+          take_memory(task, use, area);
       } else if (step == 0) {
         put_output(use, area);
       } else {
@@ -312,9 +335,9 @@ static int allocate_areas(void) {
     if (end > area->bytes) area->bytes = end;
   }
   for (i = 0; i < AREAS; ++i) bytes += areas[i].bytes;
-  in_cycle = calloc(plchost_task_count + 1u, 1);
+  phases = calloc(plchost_task_count + 1u, 1);
   left = calloc(plchost_place_count + 1u, 1);
-  if (in_cycle == NULL || left == NULL) return 0;
+  if (phases == NULL || left == NULL) return 0;
   if (bytes == 0) return 1;
   initial_bytes = calloc(bytes, 1);
   area_users = calloc(AREAS * plchost_task_count, sizeof *area_users);
@@ -371,6 +394,6 @@ int plchost_declare_places(void) {
 void plchost_forget_places(void) {
   free(initial_bytes);
   free(area_users);
-  free(in_cycle);
+  free(phases);
   free(left);
 }
