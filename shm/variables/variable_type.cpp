@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
+#include "shm/variables/string_text.hpp"
 #include "shm/variables/time_text.hpp"
 #include "shm/variables/variable_symbol.hpp"
 
@@ -22,7 +23,7 @@ namespace {
 using enum VariableType;
 
 // In the order of their numbers, from 1.
-constexpr std::array<VariableTypeTraits, 27> kTypes{{{bool_, "BOOL", 1},
+constexpr std::array<VariableTypeTraits, 31> kTypes{{{bool_, "BOOL", 1},
                                                      {sint, "SINT", 1},
                                                      {int_, "INT", 2},
                                                      {dint, "DINT", 4},
@@ -48,12 +49,18 @@ constexpr std::array<VariableTypeTraits, 27> kTypes{{{bool_, "BOOL", 1},
                                                      {timespec_date_and_time, "DT", 16},
                                                      {counted_string, "STRING", 0},
                                                      {sized_string, "STRING", 0},
-                                                     {days_date, "DATE", 8}}};
+                                                     {days_date, "DATE", 8},
+                                                     {char_, "CHAR", 1},
+                                                     {wchar, "WCHAR", 2},
+                                                     {wstring, "WSTRING", 0},
+                                                     {sized_wstring, "WSTRING", 0}}};
 constexpr std::int64_t kPerSecond = 1'000'000'000;
 constexpr std::int64_t kPerDay = 86'400 * kPerSecond;
-/// Behind the characters of a sized_string: its length. Before it may be a byte that is no character.
+/// Behind the characters of a sized_string and sized_wstring: its length. Before it may be a byte that is no
+/// character.
 using StringLength = std::uint16_t;
 constexpr std::size_t kMinSized = 2 + sizeof(StringLength);
+constexpr std::size_t kUnit = sizeof(char16_t);
 constexpr std::size_t kMaxCounted = 255;
 
 std::unexpected<Error> not_allowed(std::string_view text, std::string_view allowed) {
@@ -144,31 +151,30 @@ std::string_view characters_of(VariableType type, std::span<const std::byte> val
   return {bytes, static_cast<std::size_t>(std::find(bytes, bytes + value.size(), '\0') - bytes)};
 }
 
-bool is_control(char c) noexcept {
-  constexpr char kDelete = 0x7f;
-  return (static_cast<unsigned char>(c) < ' ') || c == kDelete;
+/// The units of UTF-16 that a string's memory holds.
+std::u16string units_of(VariableType type, std::span<const std::byte> value) {
+  std::u16string units;
+  std::size_t count = value.size() / kUnit;
+  if (type == sized_wstring) {
+    const std::size_t room = string_room(type, value.size());
+    if (room == 0) return units;
+    count = std::min<std::size_t>(load<StringLength>(value.last(sizeof(StringLength))), room);
+  }
+  units.resize(count);
+  if (count != 0) std::memcpy(units.data(), value.data(), count * kUnit);
+  if (type == wstring) units.resize(std::min(units.find(u'\0'), count));
+  return units;
 }
 
-std::string string_text(std::string_view characters) {
-  std::string plain(characters);
-  std::ranges::replace_if(plain, is_control, ' ');
-  const bool utf8 = is_printable_utf8(plain);
-  std::string text = "'";
-  for (const char c : characters) {
-    const bool high = (static_cast<unsigned char>(c) & 0x80U) != 0;
-    if (is_control(c) || (high && !utf8)) {
-      fmt::format_to(std::back_inserter(text), "${:02X}", static_cast<unsigned char>(c));
-    } else {
-      if (c == '$' || c == '\'') text += '$';
-      text += c;
-    }
-  }
-  return text + '\'';
+std::string whole_string(VariableType type, std::span<const std::byte> value) {
+  return is_wide(type) ? string_text(units_of(type, value)) : string_text(characters_of(type, value));
 }
 
 std::string whole_text(VariableType type, std::span<const std::byte> value) {
-  if (is_string(type)) return string_text(characters_of(type, value));
+  if (is_string(type)) return whole_string(type, value);
   if (value.size() < traits_of(type).bytes) return {};
+  if (type == char_) return string_text(std::string_view(reinterpret_cast<const char*>(value.data()), 1));
+  if (type == wchar) return string_text(std::u16string(1, load<char16_t>(value)));
   if (type == bool_) return value[0] == std::byte{0} ? "FALSE" : "TRUE";
   if (type == real) return real_text(load<float>(value));
   if (type == lreal) return real_text(load<double>(value));
@@ -299,62 +305,58 @@ Result<void> parse_moment(VariableType type, TimeForm form, std::string_view tex
   return {};
 }
 
-/// The character that stands behind a $; nothing: there is none. `text` goes on behind it.
-std::optional<char> take_escape(std::string_view& text) {
-  if (text.empty()) return std::nullopt;
-  constexpr std::string_view kNames = "$'LNPRT";
-  constexpr std::string_view kMeant = "$'\n\n\f\r\t";
-  const char upper = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-  if (const std::size_t found = kNames.find(upper); found != std::string_view::npos) {
-    text.remove_prefix(1);
-    return kMeant[found];
+/// With quotes: without them one letter could be the name of a variable as well.
+Result<void> parse_character(VariableType type, std::string_view text, std::span<std::byte> value) {
+  const char quote = is_wide(type) ? kWideQuote : kQuote;
+  const auto refused = [&] {
+    return not_of(type, text,
+                  is_wide(type) ? "one unit of UTF-16, as \"x\" or \"$0041\"" : "one byte, as 'x' or '$41'");
+  };
+  if (!text.starts_with(quote)) return refused();
+  if (is_wide(type)) {
+    PLCHOST_TRY_ASSIGN(const std::u16string units, parse_units(text));
+    if (units.size() != 1) return refused();
+    store(value, units.front());
+  } else {
+    PLCHOST_TRY_ASSIGN(const std::string characters, parse_characters(text));
+    if (characters.size() != 1) return refused();
+    store(value, characters.front());
   }
-  unsigned code = 0;
-  constexpr int kHexadecimal = 16;
-  const std::string_view digits = text.substr(0, 2);
-  const auto parsed = std::from_chars(digits.begin(), digits.end(), code, kHexadecimal);
-  if (digits.size() < 2 || parsed.ptr != digits.end()) return std::nullopt;
-  text.remove_prefix(2);
-  return static_cast<char>(code);
+  return {};
 }
 
-/// The characters of a text in quotes.
-Result<std::string> unquoted(std::string_view text) {
-  constexpr std::string_view kAllowed =
-      "'text' with $$, $', $L, $N, $P, $R, $T or $ and two hexadecimal digits in it";
-  std::string_view rest = text.substr(1);
-  std::string characters;
-  while (!rest.empty() && rest.front() != '\'') {
-    const char c = rest.front();
-    rest.remove_prefix(1);
-    const auto meant = c == '$' ? take_escape(rest) : std::optional(c);
-    if (!meant) return not_allowed(text, kAllowed);
-    characters += *meant;
-  }
-  if (rest != "'") return not_allowed(text, kAllowed);
-  return characters;
-}
-
-Result<void> parse_string(VariableType type, std::string_view text, std::span<std::byte> value) {
-  if (const auto rest = without_prefix(type, text); rest.starts_with('\'')) text = rest;
-  std::string characters(text);
-  if (text.starts_with('\'')) {
-    PLCHOST_TRY_ASSIGN(characters, unquoted(text));
-  }
+/// `characters` of a type, which have room in the memory of `value`.
+template <class Character>
+Result<void> put_string(VariableType type, std::string_view text,
+                        const std::basic_string<Character>& characters, std::span<std::byte> value) {
+  constexpr bool kIsWide = sizeof(Character) > 1;
   const bool counted = type == counted_string;
   const std::size_t most = string_room(type, value.size());
   if (characters.size() > most)
-    return not_allowed(text,
-                       fmt::format("a text of at most {} bytes; this one has {}", most, characters.size()));
+    return not_allowed(text, fmt::format("a text of at most {} {}; this one has {}", most,
+                                         kIsWide ? "units of UTF-16" : "bytes", characters.size()));
   if (value.empty()) return {};
-  if (!counted && characters.find('\0') != std::string::npos)
-    return not_allowed(text, "a text without $00, which ends a STRING");
+  if (!counted && characters.find(Character{}) != std::basic_string<Character>::npos)
+    return not_allowed(text, fmt::format("a text without ${:0{}}, which ends a {}", 0, 2 * sizeof(Character),
+                                         traits_of(type).name));
   std::ranges::fill(value, std::byte{0});
   if (counted) value[0] = static_cast<std::byte>(characters.size());
-  std::memcpy(value.data() + (counted ? 1 : 0), characters.data(), characters.size());
-  if (type == sized_string && value.size() >= kMinSized)
+  std::memcpy(value.data() + (counted ? 1 : 0), characters.data(), characters.size() * sizeof(Character));
+  const bool sized = type == sized_string || type == sized_wstring;
+  if (sized && value.size() >= kMinSized)
     store(value.last(sizeof(StringLength)), static_cast<StringLength>(characters.size()));
   return {};
+}
+
+Result<void> parse_string(VariableType type, std::string_view text, std::span<std::byte> value) {
+  const char quote = is_wide(type) ? kWideQuote : kQuote;
+  if (const auto rest = without_prefix(type, text); rest.starts_with(quote)) text = rest;
+  if (is_wide(type)) {
+    PLCHOST_TRY_ASSIGN(const std::u16string units, parse_units(text));
+    return put_string(type, text, units, value);
+  }
+  PLCHOST_TRY_ASSIGN(const std::string characters, parse_characters(text));
+  return put_string(type, text, characters, value);
 }
 
 }  // namespace
@@ -372,13 +374,19 @@ const VariableTypeTraits& traits_of(VariableType type) noexcept {
 }
 
 bool is_string(VariableType type) noexcept {
-  return type == string || type == counted_string || type == sized_string;
+  return traits_of(type).bytes == 0;
+}
+
+bool is_wide(VariableType type) noexcept {
+  return type >= wchar && type <= sized_wstring;
 }
 
 std::size_t string_room(VariableType type, std::size_t bytes) noexcept {
   if (bytes == 0) return 0;
   if (type == counted_string) return std::min(bytes - 1, kMaxCounted);
   if (type == sized_string) return bytes < kMinSized ? 0 : bytes - kMinSized;
+  if (type == sized_wstring) return bytes < kMinSized ? 0 : (bytes - kMinSized) / kUnit;
+  if (type == wstring) return bytes < kUnit ? 0 : bytes / kUnit - 1;
   return bytes - 1;
 }
 
@@ -394,6 +402,7 @@ Result<void> parse_variable(VariableType type, std::string_view text, std::span<
   }
   const std::string_view literal = without_prefix(type, text);
   if (type == bool_) return parse_bool(literal, value);
+  if (type == char_ || type == wchar) return parse_character(type, literal, value);
   if (type == real) return parse_real<float>(type, literal, value);
   if (type == lreal) return parse_real<double>(type, literal, value);
   if (type == days_date) return parse_moment(type, TimeForm::date, literal, value);

@@ -148,6 +148,16 @@ TEST(SymbolTable, WrongSymbolsAreRefused) {
   VariableSymbol symbol = variable("a");
   symbol.bytes = 4;
   EXPECT_TRUE(is_wrong(symbol));
+  symbol = variable("a", VariableType::wchar);
+  EXPECT_FALSE(is_wrong(symbol));
+  EXPECT_EQ(type_text(symbol), "WCHAR");
+  symbol.type = VariableType::char_;
+  EXPECT_TRUE(is_wrong(symbol)) << "of 2 bytes";
+  symbol = {.name = "a", .type = VariableType::wstring, .bytes = 162};
+  EXPECT_FALSE(is_wrong(symbol));
+  EXPECT_EQ(type_text(symbol), "WSTRING[80]");
+  symbol = {.name = "a[]", .type = VariableType::sized_wstring, .bytes = 164, .dimensions = {{1, 2}}};
+  EXPECT_EQ(type_text(symbol), "ARRAY [1..2] OF WSTRING[80]");
   symbol = variable("a", VariableType::string);
   symbol.bytes = kMaxVariableBytes + 1;
   EXPECT_TRUE(is_wrong(symbol));

@@ -55,7 +55,7 @@ void expect_refused(VariableType type, std::initializer_list<std::string_view> t
 }
 
 TEST(VariableType, NumbersAreThoseOfTheCInterface) {
-  EXPECT_EQ(variable_types().size(), PLC_TYPE_DAYS_DATE);
+  EXPECT_EQ(variable_types().size(), PLC_TYPE_SIZED_WSTRING);
   std::uint32_t number = 1;
   for (const VariableTypeTraits& type : variable_types()) {
     EXPECT_EQ(std::to_underlying(type.type), number);
@@ -70,6 +70,9 @@ TEST(VariableType, NumbersAreThoseOfTheCInterface) {
   EXPECT_EQ(std::to_underlying(VariableType::date_and_time), PLC_TYPE_DATE_AND_TIME);
   EXPECT_EQ(std::to_underlying(VariableType::string), PLC_TYPE_STRING);
   EXPECT_EQ(std::to_underlying(VariableType::timespec_time), PLC_TYPE_TIMESPEC_TIME);
+  EXPECT_EQ(std::to_underlying(VariableType::char_), PLC_TYPE_CHAR);
+  EXPECT_EQ(std::to_underlying(VariableType::wchar), PLC_TYPE_WCHAR);
+  EXPECT_EQ(std::to_underlying(VariableType::wstring), PLC_TYPE_WSTRING);
 }
 
 template <class Value>
