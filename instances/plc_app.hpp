@@ -361,9 +361,10 @@ class Application {
   }
 
   /// A variable that can be seen from outside by its name, and written and forced unless it is const. It may
-  /// be a number, a bool, std::chrono::nanoseconds (TIME), characters (STRING), an std::atomic of those, or
-  /// an array. An array's dimensions are counted from options.first. BYTE to LWORD, DATE, TOD and DT are
-  /// options.type of an integer. Static, or as long-lived.
+  /// be a number, a bool, std::chrono::nanoseconds (TIME), a char (CHAR), a char16_t (WCHAR), or an
+  /// std::atomic of those. Or it is an array: of char a STRING, of char16_t a WSTRING. An array's dimensions
+  /// are counted from options.first. BYTE to LWORD, DATE, TOD and DT are options.type of an integer. Static,
+  /// or as long-lived.
   template <class T>
   void variable(const std::string& name, T& variable, const VariableOptions& options = {}) {
     Plc_Variable declared{};

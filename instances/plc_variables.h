@@ -60,6 +60,11 @@ extern "C" {
 #define PLC_TYPE_COUNTED_STRING 25u         /* 1 byte: the length; then dwBytes - 1 of characters */
 #define PLC_TYPE_SIZED_STRING 26u           /* characters, ended by a zero; the last 2 bytes: the length */
 #define PLC_TYPE_DAYS_DATE 27u              /* 8: days since 1970, signed */
+/* Of characters, added later. */
+#define PLC_TYPE_CHAR 28u          /* 1 */
+#define PLC_TYPE_WCHAR 29u         /* 2: a unit of UTF-16, char16_t */
+#define PLC_TYPE_WSTRING 30u       /* dwBytes of units of UTF-16, ended by a zero */
+#define PLC_TYPE_SIZED_WSTRING 31u /* the same; the last 2 bytes: the length in units */
 
 #define PLC_MAX_DECLARED_VARIABLES 65536u
 #define PLC_MAX_SYMBOL_NAME 250
@@ -129,6 +134,10 @@ void CDECL plc_apply_forces(void);
 /* An array of characters, whose text is ended by a zero. */
 #define PLC_DECLARE_STRING(name, characters) \
   PLC_DECLARE_VARIABLE_(name, PLC_TYPE_STRING, &(characters)[0], sizeof(characters), 0, 0, 0, 0)
+
+/* An array of char16_t (of <uchar.h> in C), whose text in UTF-16 is ended by a zero. */
+#define PLC_DECLARE_WSTRING(name, units) \
+  PLC_DECLARE_VARIABLE_(name, PLC_TYPE_WSTRING, &(units)[0], sizeof(units), 0, 0, 0, 0)
 
 #ifdef __cplusplus
 }

@@ -32,7 +32,10 @@ constexpr unsigned variable_type() {
   if constexpr (std::is_same_v<T, float>) return PLC_TYPE_REAL;
   if constexpr (std::is_same_v<T, double>) return PLC_TYPE_LREAL;
   if constexpr (std::is_same_v<T, std::chrono::nanoseconds>) return PLC_TYPE_TIME;
-  if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool> && !std::is_same_v<T, char>) {
+  if constexpr (std::is_same_v<T, char>) return PLC_TYPE_CHAR;
+  if constexpr (std::is_same_v<T, char16_t>) return PLC_TYPE_WCHAR;
+  if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool> && !std::is_same_v<T, char> &&
+                !std::is_same_v<T, char16_t>) {
     constexpr unsigned kOfSize[] = {0, 0, 1, 0, 2, 0, 0, 0, 3};  // NOLINT(modernize-avoid-c-arrays): C++17
     return (std::is_signed_v<T> ? PLC_TYPE_SINT : PLC_TYPE_USINT) + kOfSize[sizeof(T)];
   }
@@ -43,7 +46,7 @@ constexpr unsigned variable_type() {
 template <class T>
 struct VariableLayout {
   static_assert(variable_type<T>() != 0,
-                "a variable is a number, a bool, an array of characters, or an array of these");
+                "a variable is a number, a bool, a character, an array of characters, or an array of these");
   static void fill(Plc_Variable& variable) {
     variable.dwType = variable_type<T>();
     variable.dwBytes = sizeof(T);
@@ -55,15 +58,22 @@ template <class T>
 struct VariableLayout<std::atomic<T>> : VariableLayout<T> {
   static_assert(sizeof(std::atomic<T>) == sizeof(T) && std::atomic<T>::is_always_lock_free);
 };
-template <std::size_t Count>
-struct VariableLayout<char[Count]> {
+/// A text, ended by a zero.
+template <unsigned Type, std::size_t Bytes>
+struct TextLayout {
   static void fill(Plc_Variable& variable) {
-    variable.dwType = PLC_TYPE_STRING;
-    variable.dwBytes = Count;
+    variable.dwType = Type;
+    variable.dwBytes = Bytes;
   }
 };
 template <std::size_t Count>
+struct VariableLayout<char[Count]> : TextLayout<PLC_TYPE_STRING, Count> {};
+template <std::size_t Count>
+struct VariableLayout<char16_t[Count]> : TextLayout<PLC_TYPE_WSTRING, Count * sizeof(char16_t)> {};
+template <std::size_t Count>
 struct VariableLayout<std::array<char, Count>> : VariableLayout<char[Count]> {};
+template <std::size_t Count>
+struct VariableLayout<std::array<char16_t, Count>> : VariableLayout<char16_t[Count]> {};
 template <class T, std::size_t Count>
 struct VariableLayout<T[Count]> {
   static void fill(Plc_Variable& variable) {
@@ -79,6 +89,8 @@ template <class T, std::size_t Count>
 struct VariableLayout<std::array<T, Count>> : VariableLayout<T[Count]> {};
 template <std::size_t Count>
 struct VariableLayout<const char[Count]> : VariableLayout<char[Count]> {};
+template <std::size_t Count>
+struct VariableLayout<const char16_t[Count]> : VariableLayout<char16_t[Count]> {};
 template <class T, std::size_t Count>
 struct VariableLayout<const T[Count]> : VariableLayout<T[Count]> {};
 

@@ -27,6 +27,7 @@ std::unexpected<Error> bad_condition(std::string_view what) {
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
   const auto is_operator = [](char c) { return c == '=' || c == '<' || c == '>'; };
+  const auto is_in_word = [&](char c) { return !is_operator(c) && c != ' ' && c != '(' && c != ')'; };
   for (std::size_t at = 0; at < text.size();) {
     const char c = text[at];
     std::size_t end = at + 1;
@@ -37,9 +38,16 @@ std::vector<std::string_view> words_of(std::string_view text) {
     if (is_operator(c)) {
       while (end < text.size() && is_operator(text[end])) ++end;
     } else if (c != '(' && c != ')') {
-      while (end < text.size() && !is_operator(text[end]) && text[end] != ' ' && text[end] != '(' &&
-             text[end] != ')')
-        ++end;
+      char quote = '\0';  // that the text is in, as ' of '='
+      for (end = at; end < text.size() && (quote != '\0' || is_in_word(text[end])); ++end) {
+        if (quote == '\0') {
+          if (text[end] == '\'' || text[end] == '"') quote = text[end];
+        } else if (text[end] == '$' && end + 1 < text.size()) {
+          ++end;
+        } else if (text[end] == quote) {
+          quote = '\0';
+        }
+      }
     }
     words.push_back(text.substr(at, end - at));
     at = end;

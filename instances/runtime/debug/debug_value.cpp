@@ -36,9 +36,11 @@ DebugNumber number_of(VariableType type, std::span<const std::byte> value) noexc
       return read_as<std::int32_t>(value);
     case VariableType::usint:
     case VariableType::byte:
+    case VariableType::char_:
       return read_as<std::uint8_t>(value);
     case VariableType::uint:
     case VariableType::word:
+    case VariableType::wchar:
       return read_as<std::uint16_t>(value);
     case VariableType::udint:
     case VariableType::dword:
@@ -66,6 +68,8 @@ DebugNumber number_of(VariableType type, std::span<const std::byte> value) noexc
     case VariableType::string:
     case VariableType::counted_string:
     case VariableType::sized_string:
+    case VariableType::wstring:
+    case VariableType::sized_wstring:
       return 0;
   }
   return 0;

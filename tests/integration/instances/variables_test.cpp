@@ -48,12 +48,13 @@ class Variables : public ::testing::Test {
 };
 
 TEST_F(Variables, OfEachTypeAreRead) {
-  EXPECT_EQ(client_->table().symbols().size(), 26);
-  EXPECT_EQ(process_->runtime().variables, 26);
+  EXPECT_EQ(client_->table().symbols().size(), 30);
+  EXPECT_EQ(process_->runtime().variables, 30);
   EXPECT_EQ(process_->runtime().forces, 0);
-  const auto elements = client_->elements({"main.FLAG", "Main.real", "Main.lreal", "Main.pause", "Main.text",
-                                           "Grid[1,2]", "Grid[0][0]", "Main.serial", "Main.status",
-                                           "Line.pressure[1]", "Line.pressure[3]", "Line.label"});
+  const auto elements =
+      client_->elements({"main.FLAG", "Main.real", "Main.lreal", "Main.pause", "Main.text", "Grid[1,2]",
+                         "Grid[0][0]", "Main.serial", "Main.status", "Line.pressure[1]", "Line.pressure[3]",
+                         "Line.label", "Main.letter", "Main.sign", "Line.title", "Line.units[2]"});
   // An answer that finds no moment between the cycles says so.
   ValueReply reply;
   ASSERT_TRUE(eventually([&] {
@@ -61,12 +62,18 @@ TEST_F(Variables, OfEachTypeAreRead) {
     return reply.consistent;
   }));
   EXPECT_EQ(reply.code, ErrorCode::ok);
-  EXPECT_THAT(client_->texts(reply), ElementsAre("TRUE", "1.5", "-2.0", "T#1s500ms", "'hello'", "6", "1",
-                                                 "4711", "16#00FF", "7", "9", "'press'"));
+  EXPECT_THAT(client_->texts(reply),
+              ElementsAre("TRUE", "1.5", "-2.0", "T#1s500ms", "'hello'", "6", "1", "4711", "16#00FF", "7",
+                          "9", "'press'", "'a'", "\"\u20ac\"", "\"gr\u00fc\u00df\"", "\"\u00b5m\""));
   EXPECT_GT(reply.time_monotonic_ns, 0);
   EXPECT_GT(reply.time_unix_ns, 0);
   const auto& table = client_->table();
-  EXPECT_EQ(type_text(table.symbols()[table.find("Line.temperature[1]")->symbol]), "ARRAY [1..10] OF REAL");
+  const auto type = [&](const char* name) { return type_text(table.symbols()[table.find(name)->symbol]); };
+  EXPECT_EQ(type("Line.temperature[1]"), "ARRAY [1..10] OF REAL");
+  EXPECT_EQ(type("Main.letter"), "CHAR");
+  EXPECT_EQ(type("Main.sign"), "WCHAR");
+  EXPECT_EQ(type("Line.title"), "WSTRING[7]");
+  EXPECT_EQ(type("Line.units[1]"), "ARRAY [1..2] OF WSTRING[3]");
   const VariableSymbol& input = table.symbols()[table.find("Main.input")->symbol];
   EXPECT_EQ(input.task, "Main");
   EXPECT_EQ(input.area, "%IW0");
@@ -265,6 +272,43 @@ TEST_F(Variables, ForcesGoOnInAnOnlineChange) {
   EXPECT_EQ(process_->runtime().forces, 2);
   EXPECT_EQ(unforce("Main.input").code, ErrorCode::ok);
   EXPECT_TRUE(soon("Main.output", "3"));
+}
+
+TEST(VariablesOfCharacters, AreReadWrittenAndForced) {
+  const Sandbox sandbox;
+  InstanceProcess process(sandbox, {"--application", application("characters")});
+  process.wait_until_up();
+  ValueClient client(sandbox);
+  const auto write = [&](const std::string& text) { return process.ask(ControlVerb::write_variable, text); };
+  const auto soon = [&](const std::string& name, const std::string& value) {
+    return eventually([&] { return client.read(name) == value; });
+  };
+  EXPECT_EQ(client.read("letter"), "'a'");
+  EXPECT_EQ(client.read("odd"), "'$FF'");
+  EXPECT_EQ(client.read("sign"), "\"\u20ac\"");
+  EXPECT_EQ(client.read("half"), "\"$D83D\"");
+  EXPECT_EQ(client.read("letters[1]"), "\"r\"");
+  EXPECT_EQ(client.read("names[2]"), "\"two\"");
+  EXPECT_EQ(client.read("full"), "\"xyz\"") << "its memory ends it";
+  EXPECT_TRUE(soon("copy", "\"press\""));
+  EXPECT_EQ(write("title=\"\U0001f600$D83D $\"\"").text,
+            "'title' is written: \"press\" -> \"\U0001f600$D83D $\"\"");
+  EXPECT_TRUE(soon("copy", "\"\U0001f600$D83D $\"\""));
+  EXPECT_EQ(client.read("letters[7]"), "\"$0000\"");
+  EXPECT_EQ(write("full=ab").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("full"), "\"ab\"");
+  EXPECT_THAT(write("full=abc").text, HasSubstr("a text of at most 2 units of UTF-16; this one has 3"));
+  EXPECT_EQ(write("names[1]=\"\u00e4\"").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("names[1]"), "\"\u00e4\"");
+  EXPECT_EQ(client.read("names[2]"), "\"two\"");
+  EXPECT_THAT(write("letter=b").text, HasSubstr("'b' is no CHAR; allowed is one byte, as 'x' or '$41'"));
+  EXPECT_EQ(write("letter='$''").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("letter"), "'$''");
+  EXPECT_EQ(process.ask(ControlVerb::force_variable, "copy=forced").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("same", "0"));
+  EXPECT_EQ(client.read("copy"), "\"forced\"");
+  EXPECT_EQ(write("title=forced").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("same", "1"));
 }
 
 TEST(VariablesOfNoApplication, AreNone) {

@@ -26,6 +26,8 @@ struct MotorData {
   std::int16_t speed = 0;
   std::uint8_t on = 0;
   std::int64_t total = 0;
+  char letter = 'a';
+  char16_t sign = u'a';
 };
 
 class BreakpointConditions : public testing::Test {
@@ -45,6 +47,9 @@ class BreakpointConditions : public testing::Test {
       return ValuePlace{
           .type = VariableType::dint, .bytes = 4, .base = ValuePlace::Base::local, .local = kSum};
     }
+    if (name == "letter") return own(VariableType::char_, 1, offsetof(MotorData, letter));
+    if (name == "sign") return own(VariableType::wchar, 2, offsetof(MotorData, sign));
+    if (name == "title") return own(VariableType::wstring, 8, 0);
     if (name == "label") return own(VariableType::string, 8, 0);
     return failure(ErrorCode::not_found, "no variable '" + std::string(name) + "'");
   }
@@ -92,6 +97,19 @@ TEST_F(BreakpointConditions, CompareVariablesOfTheirFrame) {
   EXPECT_TRUE(holds("on or (speed = 10)", slow));
   EXPECT_FALSE(holds("(on OR speed = 10) AND total = -1", slow));
   EXPECT_TRUE(holds("NOT (on AND speed > 5)", slow));
+}
+
+TEST_F(BreakpointConditions, CompareCharacters) {
+  const MotorData data{.letter = '\xe9', .sign = u'='};
+  EXPECT_TRUE(holds("letter = '$E9' AND letter > 'z'", data));
+  EXPECT_TRUE(holds("sign = \"=\"", data));
+  EXPECT_TRUE(holds("(sign <> \" \")AND NOT (sign = WCHAR#\")\")", data));
+  EXPECT_FALSE(holds("letter = CHAR#'$''", data));
+  EXPECT_TRUE(holds("letter > sign", data));
+  EXPECT_THAT(fault("letter = e"), HasSubstr("no variable 'e'"));
+  EXPECT_THAT(fault("letter = '$'"), HasSubstr("allowed is"));
+  EXPECT_THAT(fault("letter = 'e"), HasSubstr("allowed is"));
+  EXPECT_THAT(fault("title = \"a\""), HasSubstr("'title' is a string"));
 }
 
 TEST_F(BreakpointConditions, OfAFunctionHaveNoOwnVariables) {

@@ -183,7 +183,7 @@ TEST_F(DeclaredPous, AreRefusedForTheirLocalVariables) {
   EXPECT_EQ(with({"a[]", PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
   EXPECT_EQ(with({std::string(251, 'a').c_str(), PLC_TYPE_INT, 0, 0, 0}), ERR_PARAMETER);
   EXPECT_EQ(with({"a", 0, 0, 0, 0}), ERR_PARAMETER);
-  EXPECT_EQ(with({"a", PLC_TYPE_DAYS_DATE + 1, 0, 0, 0}), ERR_PARAMETER);
+  EXPECT_EQ(with({"a", PLC_TYPE_SIZED_WSTRING + 1, 0, 0, 0}), ERR_PARAMETER);
   EXPECT_EQ(with({"a", PLC_TYPE_INT, 4, 0, 0}), ERR_PARAMETER);
   EXPECT_EQ(with({"a", PLC_TYPE_STRING, 0, 0, 0}), ERR_PARAMETER);
   EXPECT_EQ(with({"a", PLC_TYPE_STRING, PLC_MAX_STRING + 1, 0, 0}), ERR_PARAMETER);

@@ -72,8 +72,8 @@ TEST(DeclaredVariable, WhatIsNotAllowedIsRefused) {
   bad.pAddress = nullptr;
   EXPECT_EQ(refusal(bad), "variable 'Main.word': pAddress is null");
   bad = good;
-  bad.dwType = 28;
-  EXPECT_THAT(refusal(bad), HasSubstr("dwType 28 is not allowed: 1 to 27 is"));
+  bad.dwType = 32;
+  EXPECT_THAT(refusal(bad), HasSubstr("dwType 32 is not allowed: 1 to 31 is"));
   bad = good;
   bad.dwFlags = 2;
   EXPECT_THAT(refusal(bad), HasSubstr("dwFlags 0x2 are not allowed"));

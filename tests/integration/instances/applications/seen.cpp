@@ -48,6 +48,10 @@ std::int16_t version = VERSION;
 std::uint16_t status = 0x00ff;
 short pressure[3] = {7, 8, 9};
 char label[8] = "press";
+char letter = 'a';
+std::atomic<char16_t> sign{u'\u20ac'};
+char16_t title[8] = u"gr\u00fc\u00df";
+std::array<std::array<char16_t, 4>, 2> units{{{u'k', u'g'}, {u'\u00b5', u'm'}}};
 
 // The compiler keeps neither out of the other's place.
 void move(std::uint64_t& to, std::uint64_t value) {
@@ -115,6 +119,10 @@ void setup(plc::Application& app) {
   app.variable("Main.status", status, word);
   PLC_DECLARE_ARRAY("Line.pressure[]", PLC_TYPE_INT, pressure, 1);
   PLC_DECLARE_STRING("Line.label", label);
+  app.variable("Main.letter", letter);
+  app.variable("Main.sign", sign);
+  app.variable("Line.title", title);
+  app.variable("Line.units", units, from_one);
 }
 
 }  // namespace
