@@ -43,7 +43,7 @@ COLUMNS = {"source": "source", "strucpp": "STruC++", "runner": "values as its ru
            "both": "values as by STruC++"}
 BEGIN, END = "<!-- made by tests/compilers/proof.py --write", "<!-- end of the table -->"
 # As instances/plc_variables.h numbers and lays out the types.
-BOOL, STRING, COUNTED_STRING, SIZED_STRING, DAYS_DATE = 1, 20, 25, 26, 27
+BOOL, STRING, COUNTED_STRING, SIZED_STRING, DAYS_DATE, SIZED_WSTRING = 1, 20, 25, 26, 27, 31
 PLAIN = {2: "b", 3: "h", 4: "i", 5: "q", 6: "B", 7: "H", 8: "I", 9: "Q", 10: "B", 11: "H", 12: "I", 13: "Q", 14: "f", 15: "d",
          16: "q", 17: "q", 18: "q", 19: "q"}
 
@@ -100,6 +100,8 @@ def decoded(kind, value):
         return value[1:1 + value[0]].decode("latin-1")
     if kind in (STRING, SIZED_STRING):
         return value.split(b"\0")[0].decode("latin-1")
+    if kind == SIZED_WSTRING:
+        return value.decode("utf-16-le", "replace").split("\0")[0]
     if len(value) == 16:
         seconds, nanoseconds = struct.unpack("<qq", value)
         return seconds * 1_000_000_000 + nanoseconds

@@ -182,8 +182,8 @@ REFUSES(plc_channel_receive, RTS_HANDLE, void*, unsigned int, Block_Info*)
  * ------------------------------------------------------------------------------------------------ */
 
 static unsigned int bytes_of(const Plc_Variable* variable) {
-  static const unsigned char bytes[] = {0, 1, 1, 2, 4, 8, 1, 2,  4,  8,  1,  2, 4, 8,
-                                        4, 8, 8, 8, 8, 8, 0, 16, 16, 16, 16, 0, 0, 8};
+  static const unsigned char bytes[] = {0, 1, 1, 2, 4, 8, 1,  2,  4,  8,  1, 2, 4, 8, 4,
+                                        8, 8, 8, 8, 8, 0, 16, 16, 16, 16, 0, 0, 8, 1, 2};
   if (variable->dwBytes != 0) return variable->dwBytes;
   return variable->dwType < sizeof bytes ? bytes[variable->dwType] : 0;
 }

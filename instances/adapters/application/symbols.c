@@ -13,7 +13,7 @@ static void declare(const struct plchost_symbol* symbol) {
   Plc_Variable variable;
   unsigned int i;
   const int is_string = symbol->type == PLC_TYPE_STRING || symbol->type == PLC_TYPE_COUNTED_STRING ||
-                        symbol->type == PLC_TYPE_SIZED_STRING;
+                        symbol->type == PLC_TYPE_SIZED_STRING || symbol->type == PLC_TYPE_SIZED_WSTRING;
   RTS_RESULT result;
   memset(&variable, 0, sizeof variable);
   variable.dwSize = sizeof variable;

@@ -22,10 +22,11 @@ constexpr std::string_view kIndent = "    ";
 constexpr std::string_view kLibrary = "IEC_";
 constexpr std::string_view kPlain = "_t";
 constexpr std::string_view kString = "IECStringVar<";
+constexpr std::string_view kWideString = "IECWStringVar<";
 constexpr std::string_view kEnumeration = "IEC_ENUM<";
 constexpr std::string_view kArray = "Array";
 /// The library adds the length to the characters, and an end.
-constexpr unsigned kMostCharacters = PLC_MAX_STRING - 16;
+constexpr unsigned kMostBytes = PLC_MAX_STRING - 16;
 
 bool is_letter(char c) noexcept {
   return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
@@ -50,12 +51,17 @@ unsigned elementary(std::string_view type) {
   return type.ends_with(kPlain) ? type_number(type.substr(0, type.size() - kPlain.size())) : 0;
 }
 
-bool is_string(std::string_view type) {
-  if (type == "IEC_STRING") return true;
+/// The number of a type of texts, as "IEC_STRING" or "IECStringVar<10>"; 0: it is none, or has too many
+/// characters.
+unsigned string_number(std::string_view type) {
+  if (type == "IEC_STRING") return PLC_TYPE_SIZED_STRING;
+  if (type == "IEC_WSTRING") return PLC_TYPE_SIZED_WSTRING;
+  const bool is_wide = type.starts_with(kWideString);
+  if (!is_wide && !type.starts_with(kString)) return 0;
   unsigned characters = 0;
-  if (!type.starts_with(kString)) return false;
-  std::from_chars(type.data() + kString.size(), type.data() + type.size(), characters);
-  return characters > 0 && characters <= kMostCharacters;
+  std::from_chars(type.data() + type.find('<') + 1, type.data() + type.size(), characters);
+  if (characters == 0 || characters > kMostBytes / (is_wide ? sizeof(char16_t) : 1)) return 0;
+  return is_wide ? PLC_TYPE_SIZED_WSTRING : PLC_TYPE_SIZED_STRING;
 }
 
 /// "IEC_ENUM<COLOR>" is of "COLOR"; others stay as they are.
@@ -195,8 +201,8 @@ void CppValues::add(std::vector<iec::DebugLocal>& locals, const Part& part, std:
                       .dimensions = part.dimensions});
   };
   if (const unsigned number = elementary(type); number != 0) return found(fmt::format("{}u", number), "0");
-  if (is_string(type))
-    return found(fmt::format("{}u", PLC_TYPE_SIZED_STRING), fmt::format("plchost_bytes<strucpp::{}>", type));
+  if (const unsigned number = string_number(type); number != 0)
+    return found(fmt::format("{}u", number), fmt::format("plchost_bytes<strucpp::{}>", type));
   if (type.starts_with(kArray)) return add_array(locals, part, depth);
   const std::string plain = enumeration_in(type);
   if (enumerations_.contains(plain))

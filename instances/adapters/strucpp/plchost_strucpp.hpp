@@ -173,11 +173,16 @@ template <class T>
 const T& plchost_value(const strucpp::IECVar<T>& variable) noexcept {
   return *variable.raw_ptr();
 }
-// These two have it as their first member.
+// These have it as their first member.
 template <std::size_t N>
 strucpp::IECString<N>& plchost_value(strucpp::IECStringVar<N>& variable) noexcept {
   static_assert(std::is_standard_layout_v<strucpp::IECStringVar<N>>);
   return reinterpret_cast<strucpp::IECString<N>&>(variable);
+}
+template <std::size_t N>
+strucpp::IECWString<N>& plchost_value(strucpp::IECWStringVar<N>& variable) noexcept {
+  static_assert(std::is_standard_layout_v<strucpp::IECWStringVar<N>>);
+  return reinterpret_cast<strucpp::IECWString<N>&>(variable);
 }
 template <class E>
 strucpp::IEC_ENUM_Value<E>& plchost_value(strucpp::IEC_ENUM_Var<E>& variable) noexcept {
@@ -240,10 +245,16 @@ struct plchost_type {
     return std::is_arithmetic_v<T> && sizeof(T) == shown.bytes ? shown.type : 0;
   }
 };
-template <std::size_t N>
-struct plchost_type<strucpp::IECString<N>> {
-  static constexpr unsigned int of(const plchost_shown& shown) { return shown.bytes == 0 ? shown.type : 0; }
+template <class Text>
+struct plchost_text_type {
+  static constexpr unsigned int of(const plchost_shown& shown) {
+    return shown.bytes == 0 && sizeof(Text) <= 4096 ? shown.type : 0;  // PLC_MAX_STRING
+  }
 };
+template <std::size_t N>
+struct plchost_type<strucpp::IECString<N>> : plchost_text_type<strucpp::IECString<N>> {};
+template <std::size_t N>
+struct plchost_type<strucpp::IECWString<N>> : plchost_text_type<strucpp::IECWString<N>> {};
 template <class E>
 struct plchost_type<strucpp::IEC_ENUM_Value<E>> {
   static constexpr unsigned int of(const plchost_shown&) { return plchost_enumeration<E>; }
@@ -295,8 +306,8 @@ template <std::size_t Dimensions, class Root, class Path>
 void plchost_show(void (*use)(const plchost_symbol*), Root& root, Path path, const plchost_shown& shown) {
   if (plchost_find(std::make_index_sequence<Dimensions>(), use, root, path, shown)) return;
   char text[200];
-  std::snprintf(text, sizeof text, "%s cannot be seen from outside: STruC++ keeps it in another way",
-                shown.name);
+  std::snprintf(text, sizeof text, "%s cannot be seen from outside: STruC++ keeps it %s", shown.name,
+                shown.bytes == 0 ? "as a text of more than 4096 bytes" : "in another way");
   plc_log(1, text);
 }
 

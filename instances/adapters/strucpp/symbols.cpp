@@ -25,14 +25,27 @@ struct TableType {
   unsigned type;
   unsigned bytes;
 };
-constexpr std::array<TableType, 20> kTypes{
-    {{"BOOL", PLC_TYPE_BOOL, 1},        {"SINT", PLC_TYPE_SINT, 1},          {"INT", PLC_TYPE_INT, 2},
-     {"DINT", PLC_TYPE_DINT, 4},        {"LINT", PLC_TYPE_LINT, 8},          {"USINT", PLC_TYPE_USINT, 1},
-     {"UINT", PLC_TYPE_UINT, 2},        {"UDINT", PLC_TYPE_UDINT, 4},        {"ULINT", PLC_TYPE_ULINT, 8},
-     {"BYTE", PLC_TYPE_BYTE, 1},        {"WORD", PLC_TYPE_WORD, 2},          {"DWORD", PLC_TYPE_DWORD, 4},
-     {"LWORD", PLC_TYPE_LWORD, 8},      {"REAL", PLC_TYPE_REAL, 4},          {"LREAL", PLC_TYPE_LREAL, 8},
-     {"TIME", PLC_TYPE_TIME, 8},        {"DATE", PLC_TYPE_DAYS_DATE, 8},     {"TOD", PLC_TYPE_TIME_OF_DAY, 8},
-     {"DT", PLC_TYPE_DATE_AND_TIME, 8}, {"STRING", PLC_TYPE_SIZED_STRING, 0}}};
+constexpr std::array<TableType, 21> kTypes{{{"BOOL", PLC_TYPE_BOOL, 1},
+                                            {"SINT", PLC_TYPE_SINT, 1},
+                                            {"INT", PLC_TYPE_INT, 2},
+                                            {"DINT", PLC_TYPE_DINT, 4},
+                                            {"LINT", PLC_TYPE_LINT, 8},
+                                            {"USINT", PLC_TYPE_USINT, 1},
+                                            {"UINT", PLC_TYPE_UINT, 2},
+                                            {"UDINT", PLC_TYPE_UDINT, 4},
+                                            {"ULINT", PLC_TYPE_ULINT, 8},
+                                            {"BYTE", PLC_TYPE_BYTE, 1},
+                                            {"WORD", PLC_TYPE_WORD, 2},
+                                            {"DWORD", PLC_TYPE_DWORD, 4},
+                                            {"LWORD", PLC_TYPE_LWORD, 8},
+                                            {"REAL", PLC_TYPE_REAL, 4},
+                                            {"LREAL", PLC_TYPE_LREAL, 8},
+                                            {"TIME", PLC_TYPE_TIME, 8},
+                                            {"DATE", PLC_TYPE_DAYS_DATE, 8},
+                                            {"TOD", PLC_TYPE_TIME_OF_DAY, 8},
+                                            {"DT", PLC_TYPE_DATE_AND_TIME, 8},
+                                            {"STRING", PLC_TYPE_SIZED_STRING, 0},
+                                            {"WSTRING", PLC_TYPE_SIZED_WSTRING, 0}}};
 
 /// A word of a path, and the "[]" behind it.
 struct Step {

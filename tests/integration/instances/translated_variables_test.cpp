@@ -138,6 +138,76 @@ TEST_P(VariablesOfTranslatedText, AreSeenWrittenAndForcedFromOutside) {
   EXPECT_TRUE(eventually([&] { return client.read("total") != "100"; }));
 }
 
+/// MATIEC knows no WSTRING.
+class WideTexts : public VariablesOfTranslatedText {};
+INSTANTIATE_TEST_SUITE_P(By, WideTexts, ::testing::Values("strucpp"),
+                         [](const auto& compiler) { return compiler.param; });
+
+TEST_P(WideTexts, AreSeenWrittenForcedAndRetained) {
+  start(R"(
+TYPE Part : STRUCT label : WSTRING(10); plain : STRING(10); END_STRUCT; END_TYPE
+PROGRAM Main
+  VAR_EXTERNAL shared : WSTRING; END_VAR
+  VAR
+    title : WSTRING := "press";
+    copied : WSTRING(11);
+    again : WSTRING(20);
+    p : Part;
+    huge : WSTRING(3000);
+    names : ARRAY[1..2] OF WSTRING;
+  END_VAR
+  VAR RETAIN kept : WSTRING(4); END_VAR
+  copied := title;
+  again := copied;
+  names[2] := title;
+  p.label := shared;
+  kept := "k";
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL shared : WSTRING; END_VAR
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    PROGRAM one WITH fast : Main;
+  END_RESOURCE
+END_CONFIGURATION
+)");
+  ValueClient client(sandbox);
+  const auto soon = [&](const std::string& name, const std::string& value) {
+    return eventually([&] { return client.read(name) == value; });
+  };
+  const auto write = [&](const std::string& argument) {
+    return sut->ask(ControlVerb::write_variable, argument);
+  };
+  const auto symbol = [&](const std::string& name) {
+    return client.table().symbols()[client.table().find(name)->symbol];
+  };
+  EXPECT_EQ(type_text(symbol("one.title")), "WSTRING[254]");
+  EXPECT_EQ(type_text(symbol("one.copied")), "WSTRING[11]");
+  EXPECT_EQ(type_text(symbol("one.p.label")), "WSTRING[10]");
+  EXPECT_EQ(type_text(symbol("one.names[1]")), "ARRAY [1..2] OF WSTRING[254]");
+  EXPECT_EQ(type_text(symbol("shared")), "WSTRING[254]");
+  EXPECT_EQ(symbol("one.kept").area, "retain");
+  EXPECT_FALSE(client.table().find("one.huge"));
+  EXPECT_THAT(sut->log(),
+              HasSubstr("one.huge cannot be seen from outside: STruC++ keeps it as a text of more "
+                        "than 4096 bytes"));
+  EXPECT_EQ(client.read("one.title"), "\"press\"");
+  EXPECT_EQ(write("one.title=\"gr\u00fc\u00df \U0001f600$D83D\"").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.copied", "\"gr\u00fc\u00df \U0001f600$D83D\""));
+  EXPECT_TRUE(soon("one.names[2]", "\"gr\u00fc\u00df \U0001f600$D83D\""));
+  EXPECT_EQ(client.read("one.names[1]"), "\"\"");
+  EXPECT_EQ(write("one.kept=\u20ac1234").code, ErrorCode::invalid_argument);
+  EXPECT_EQ(write("shared=\u20ac1234").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.p.label", "\"\u20ac1234\""));
+  EXPECT_EQ(sut->ask(ControlVerb::force_variable, "one.copied=WSTRING#\"held\"").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.copied", "\"held\""));
+  EXPECT_EQ(sut->ask(ControlVerb::force_variable, "one.title=\"forced\"").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.names[2]", "\"forced\""));
+  EXPECT_EQ(client.read("one.copied"), "\"held\"");
+  EXPECT_EQ(sut->ask(ControlVerb::unforce_variable, "*").code, ErrorCode::ok);
+  EXPECT_TRUE(soon("one.again", "\"forced\""));
+}
+
 /// MATIEC knows no EXTENDS.
 class VariablesOfAnHeir : public VariablesOfTranslatedText {};
 INSTANTIATE_TEST_SUITE_P(By, VariablesOfAnHeir, ::testing::Values("strucpp"),

@@ -261,6 +261,9 @@ IEC_INT COUNTER::get_SIZE() const {
     SMALL SMALL_ = 3;
     IECStringVar<10> S = "(=";
     IECStringVar<9000> LONG;
+    IECWStringVar<2040> WS;
+    IEC_WSTRING WW;
+    IECWStringVar<2041> WIDE;
     IEC_INT* P;
     COUNTER BLOCK;
 #line 4 "x"
@@ -297,7 +300,9 @@ IEC_INT COUNTER::get_SIZE() const {
                   "CC[] plchost_enumeration<strucpp::COLOR> 0 ::plchost_local(::plchost_at(CC, 1L)) 0-0 "
                   "1+2 1u * sizeof(strucpp::IEC_ENUM<strucpp::COLOR>)",
                   "small 3u 0 ::plchost_local(SMALL_) 0-0",
-                  "S 26u plchost_bytes<strucpp::IECStringVar<10>> ::plchost_local(S) 0-0"));
+                  "S 26u plchost_bytes<strucpp::IECStringVar<10>> ::plchost_local(S) 0-0",
+                  "WS 31u plchost_bytes<strucpp::IECWStringVar<2040>> ::plchost_local(WS) 0-0",
+                  "WW 31u plchost_bytes<strucpp::IEC_WSTRING> ::plchost_local(WW) 0-0"));
   EXPECT_THAT(made.texts[0],
               HasSubstr("RESET_result;\n  void* const plchost_locals_[] = {::plchost_local(TO), "
                         "::plchost_local(BY), ::plchost_local(RESET_result)};\n"

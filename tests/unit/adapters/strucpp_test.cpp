@@ -252,6 +252,15 @@ TEST(StrucppSymbols, OfArraysAreOneWithItsDimensions) {
                               "{{-1, 3u}, {0, 4u}, {1, 2u}, }}"));
 }
 
+TEST(StrucppSymbols, OfTextsHaveBytesOfTheirOwn) {
+  Parts parts;
+  parts.symbols = symbol("ONE.TOTAL", "WSTRING", "g_config.ONE.TOTAL") + "," +
+                  symbol("ONE.RAW", "STRING", "g_config.ONE.RAW");
+  const std::string text = glue_of(parts).text;
+  EXPECT_THAT(text, HasSubstr("{\"one.TOTAL\", 31u, 0u, 0u, "));
+  EXPECT_THAT(text, HasSubstr("{\"one.RAW\", 26u, 0u, 0u, "));
+}
+
 TEST(StrucppSymbols, SayWhichVariablesTheTableLeavesOut) {
   Parts parts;
   parts.symbols = symbol("ONE.LINK", "INT", "g_config.ONE.LINK");
@@ -296,12 +305,12 @@ TEST(StrucppSymbols, WithALongNameAreTold) {
 
 TEST(StrucppSymbols, ThatCannotBeSeenAreTold) {
   Parts parts;
-  parts.symbols = symbol("ONE.TOTAL", "WSTRING", "g_config.ONE.TOTAL") + "," +
+  parts.symbols = symbol("ONE.TOTAL", "WCHAR", "g_config.ONE.TOTAL") + "," +
                   symbol("ONE.RAW[][].X[][]", "INT", "g_config.ONE.RAW[][].X[][]", "[0,1],[0,1],[0,1],[0,1]");
   const iec::Glue glue = glue_of(parts);
   EXPECT_THAT(glue.text, Not(HasSubstr("plchost_show<")));
   EXPECT_THAT(texts(glue.remarks), Contains("a.st:4:7: one.TOTAL cannot be seen from outside: its type is "
-                                            "WSTRING"));
+                                            "WCHAR"));
   EXPECT_THAT(texts(glue.remarks), Contains("a.st:4:7: one.RAW[][].X[][] cannot be seen from outside: it has "
                                             "more than 3 dimensions"));
 }
