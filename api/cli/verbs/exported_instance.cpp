@@ -41,7 +41,7 @@ ExportedTask task_of(const plc_TaskStatus& task) {
           .event = std::string(dds::text_of(task.external_event))};
 }
 
-constexpr std::string_view kText = "STRING[";
+constexpr std::string_view kText = "STRING[";  // also behind the W of "WSTRING["
 constexpr std::string_view kLengthOfMatiec = "126";
 constexpr std::string_view kLengthOfStrucpp = "254";
 
@@ -49,6 +49,7 @@ constexpr std::string_view kLengthOfStrucpp = "254";
 std::string_view text_length_in(std::string_view type) {
   const std::size_t of = type.find("] OF ");
   if (of != std::string_view::npos) type.remove_prefix(of + 5);
+  if (type.starts_with('W')) type.remove_prefix(1);
   if (!type.starts_with(kText)) return {};
   return type.substr(kText.size(), type.find(']') - kText.size());
 }
@@ -89,7 +90,7 @@ ExportedVariable variable_of(const plc_VariableRecord& record, bool with_lengths
     name.remove_prefix(1);
   }
   const std::string_view length = text_length_in(type);
-  if (!length.empty() && (!with_lengths || length == kLengthOfStrucpp)) type = "STRING";
+  if (!length.empty() && (!with_lengths || length == kLengthOfStrucpp)) type = type.substr(0, type.find('['));
   variable.type = here.empty() ? std::string(type) : fmt::format("ARRAY [{}] OF {}", here, type);
   return variable;
 }

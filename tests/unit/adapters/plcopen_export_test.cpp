@@ -269,6 +269,20 @@ TEST(PlcopenSchema, HoldsForWhatIsExported) {
   std::filesystem::remove_all(folder);
 }
 
+// The schema has no element for characters, and none for types of a later version.
+TEST(PlcopenExport, HasWideTextsAndNamesOtherTypes) {
+  ExportedInstance one{.name = "one", .tasks = {}, .programs = {}, .variables = {}};
+  one.variables = {{.path = "title", .type = "WSTRING[80]", .address = ""},
+                   {.path = "all", .type = "ARRAY [0..2] OF WSTRING", .address = ""},
+                   {.path = "letter", .type = "CHAR", .address = ""},
+                   {.path = "sign", .type = "WCHAR", .address = ""},
+                   {.path = "later", .type = "XCHAR[8]", .address = ""}};
+  const std::string xml = project_of(plant_of({one}));
+  for (const auto* const part : {R"(<wstring length="80" />)", "<wstring />", R"(<derived name="CHAR" />)",
+                                 R"(<derived name="WCHAR" />)", R"(<derived name="XCHAR" />)"})
+    EXPECT_THAT(xml, HasSubstr(part));
+}
+
 TEST(PlcopenExport, SaysInTheFileWhatItDoesNotHave) {
   EXPECT_THAT(project_of(plant_of({line()})), HasSubstr("<Comment>not exported"));
 }

@@ -120,6 +120,12 @@ TEST(ExportedInstance, HasVariablesWithTheBoundsOfTheirArrays) {
                                  "pump[1..4].hours : ARRAY [0..9] OF STRING[8]", " : "));
 }
 
+// Of a later version: a type is a text, so a client shows each.
+TEST(ExportedInstance, HasTypesThatItDoesNotKnow) {
+  const auto sut = exported_instance("line1", {}, std::vector<ListedVariable>{variable("a", "XCHAR[8]")});
+  EXPECT_EQ(sut.variables.at(0).type, "XCHAR[8]");
+}
+
 // A length that a compiler gives to all texts without one is none.
 TEST(ExportedInstance, HasTextsWithTheLengthsThatTheyWereGiven) {
   const auto types_of = [](const std::vector<ListedVariable>& variables) {
@@ -130,6 +136,8 @@ TEST(ExportedInstance, HasTextsWithTheLengthsThatTheyWereGiven) {
   EXPECT_THAT(
       types_of({variable("a", "STRING[20]"), variable("b", "STRING[254]"), variable("c", "STRING[126]")}),
       ElementsAre("STRING[20]", "STRING", "STRING[126]"));
+  EXPECT_THAT(types_of({variable("a", "WSTRING[20]"), variable("b[]", "ARRAY [1..2] OF WSTRING[254]")}),
+              ElementsAre("WSTRING[20]", "ARRAY [1..2] OF WSTRING"));
   const ListedVariable program = variable("one", "STRING[6]", "fast", "program");
   EXPECT_THAT(
       types_of({program, variable("a[]", "ARRAY [1..2] OF STRING[126]"), variable("b", "STRING[126]")}),
