@@ -42,7 +42,8 @@ class LossOfCycles : public ::testing::TestWithParam<const char*> {
   /// A loss of the task with this cause, which may be one of several: the machine has others for it, too. If
   /// it stands still just then, or another test uses the core, that is the cause. So `event`, which injects
   /// this one, is posted again and again, at times that such tests do not have in common.
-  std::optional<LossRecord> told(LossCause cause, const char* event = nullptr) {
+  std::optional<LossRecord> told(LossCause cause, const char* event = nullptr,
+                                 std::int64_t least_stall_ns = 0) {
     std::optional<LossRecord> found;
     TimePoint next_post;
     std::mt19937 random(std::random_device{}());
@@ -53,7 +54,8 @@ class LossOfCycles : public ::testing::TestWithParam<const char*> {
         next_post = MonotonicClock::now() + std::chrono::milliseconds(pause_ms(random));
       }
       for (const LossRecord& loss : losses()) {
-        if (loss.cause == cause && loss.task.view() == "Loser") found = loss;
+        const bool is_it = loss.cause == cause && loss.stall_ns >= least_stall_ns;
+        if (is_it && loss.task.view() == "Loser") found = loss;
       }
       return found.has_value();
     })) << all();
@@ -95,9 +97,10 @@ TEST_P(LossOfCycles, ByAProcessThatStoodStillIsAStall) {
   ASSERT_EQ(::kill(process_.pid(), SIGSTOP), 0);
   std::this_thread::sleep_for(60ms);
   ASSERT_EQ(::kill(process_.pid(), SIGCONT), 0);
-  const auto loss = told(LossCause::stall);
+  // The machine may stand still for a shorter time before.
+  const auto loss = told(LossCause::stall, nullptr, 20 * kMs);
   ASSERT_TRUE(loss);
-  EXPECT_GE(loss->stall_ns, 20 * kMs) << all();
+  EXPECT_GE(loss->lost, 3U) << all();
 }
 
 TEST_P(LossOfCycles, ByAnEventVariableThatTakesLongIsToldSo) {
