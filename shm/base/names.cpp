@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/utf8.hpp"
+
 namespace plchost {
 
 namespace {
@@ -27,19 +29,11 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 // The bytes of the character that the text begins with; 0: not one, or a control character.
 std::size_t printable_character(std::string_view text) noexcept {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char lead = byte(0);
-  if (lead < 0x80) return lead >= ' ' && lead != 0x7f ? 1 : 0;
-  const std::size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
-  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) return 0;
-  std::uint32_t code = lead & (0xffU >> (bytes + 1));
-  for (std::size_t i = 1; i < bytes; ++i) {
-    if ((byte(i) & 0xc0U) != 0x80) return 0;
-    code = code << 6 | (byte(i) & 0x3fU);
-  }
-  constexpr std::array<std::uint32_t, 5> kLeast = {0, 0, 0xa0, 0x800, 0x10000};  // shorter forms, controls
-  const bool surrogate = code >= 0xd800 && code <= 0xdfff;
-  return code >= kLeast[bytes] && !surrogate && code <= 0x10ffff ? bytes : 0;
+  const auto character = first_utf8(text);
+  if (!character) return 0;
+  const char32_t code = character->code;
+  const bool is_control = code < 0x20 || (code >= 0x7f && code < 0xa0);
+  return is_control ? 0 : character->bytes;
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
+#include "shm/base/utf8.hpp"
 
 namespace plchost {
 
@@ -26,7 +27,6 @@ constexpr char32_t kFirstHigh = 0xd800;
 constexpr char32_t kFirstLow = 0xdc00;
 constexpr char32_t kBehindLow = 0xe000;
 constexpr char32_t kFirstOfPairs = 0x10000;
-constexpr char32_t kLastCharacter = 0x10ffff;
 
 bool is_control(char c) noexcept {
   constexpr char kDelete = 0x7f;
@@ -54,24 +54,6 @@ std::string utf8_of(char32_t character) {
 
 // ---- from text
 
-/// The character of UTF-8 that the text begins with; nothing: there is none. `text` goes on behind it.
-std::optional<char32_t> take_utf8(std::string_view& text) noexcept {
-  const auto lead = static_cast<unsigned char>(text.front());
-  const std::size_t bytes = lead < 0x80 ? 1 : lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
-  if ((lead >= 0x80 && lead < 0xc2) || lead > 0xf4 || text.size() < bytes) return std::nullopt;
-  char32_t character = bytes == 1 ? lead : lead & (0xffU >> (bytes + 1));
-  for (const char c : text.substr(1, bytes - 1)) {
-    const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xc0U) != 0x80) return std::nullopt;
-    character = character << 6U | (byte & 0x3fU);
-  }
-  constexpr std::array<char32_t, 5> kLeast = {0, 0, 0x80, 0x800, kFirstOfPairs};  // shorter forms are none
-  const bool is_half = character >= kFirstHigh && character < kBehindLow;
-  if (character < kLeast.at(bytes) || is_half || character > kLastCharacter) return std::nullopt;
-  text.remove_prefix(bytes);
-  return character;
-}
-
 /// The character that the text begins with, without a meaning of its own; false: it is none.
 bool take_plain(std::string_view& text, std::string& characters) {
   characters += text.front();
@@ -79,13 +61,15 @@ bool take_plain(std::string_view& text, std::string& characters) {
   return true;
 }
 bool take_plain(std::string_view& text, std::u16string& units) {
-  const auto character = take_utf8(text);
+  const auto character = first_utf8(text);
   if (!character) return false;
-  if (*character < kFirstOfPairs) {
-    units += static_cast<char16_t>(*character);
+  text.remove_prefix(character->bytes);
+  const char32_t code = character->code;
+  if (code < kFirstOfPairs) {
+    units += static_cast<char16_t>(code);
   } else {
-    units += static_cast<char16_t>(kFirstHigh + ((*character - kFirstOfPairs) >> 10U));
-    units += static_cast<char16_t>(kFirstLow + ((*character - kFirstOfPairs) & 0x3ffU));
+    units += static_cast<char16_t>(kFirstHigh + ((code - kFirstOfPairs) >> 10U));
+    units += static_cast<char16_t>(kFirstLow + ((code - kFirstOfPairs) & 0x3ffU));
   }
   return true;
 }
