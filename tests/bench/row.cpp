@@ -178,30 +178,30 @@ std::string details(const Row& row) {
   return text;
 }
 
-/// The rounds' bounds lie so far apart that they show the machine, of whose floor they are made.
-bool bound_moves(const std::vector<Round>& rounds, std::size_t index) {
-  constexpr double kApart = 1.5;
-  double least = std::numeric_limits<double>::infinity();
-  double most = 0;
-  for (const Round& round : rounds) {
-    const Target& target = round.targets[index];
-    if (!target.decided()) continue;
-    least = std::min(least, target.bound);
-    most = std::max(most, target.bound);
-  }
-  return most > kApart * least;
-}
-
-/// The bound is one figure, the same in each round.
-bool steady(const std::vector<Round>& rounds, std::size_t index) {
+/// The least and the most of a figure of a target, of the rounds that decide it.
+std::pair<double, double> range_of(const std::vector<Round>& rounds, std::size_t index,
+                                   double Target::* figure) {
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
   for (const Round& round : rounds) {
     const Target& target = round.targets[index];
     if (!target.decided()) continue;
-    least = std::min(least, target.measured);
-    most = std::max(most, target.measured);
+    least = std::min(least, target.*figure);
+    most = std::max(most, target.*figure);
   }
+  return {least, most};
+}
+
+/// The rounds' bounds lie so far apart that they show the machine, of whose floor they are made.
+bool bound_moves(const std::vector<Round>& rounds, std::size_t index) {
+  constexpr double kApart = 1.5;
+  const auto [least, most] = range_of(rounds, index, &Target::bound);
+  return most > kApart * least;
+}
+
+/// The bound is one figure, the same in each round.
+bool steady(const std::vector<Round>& rounds, std::size_t index) {
+  const auto [least, most] = range_of(rounds, index, &Target::measured);
   return most - least <= rounds.front().targets[index].bound;  // also if there is none
 }
 
