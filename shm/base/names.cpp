@@ -105,9 +105,26 @@ std::string event_object_name(std::string_view instance, std::string_view event)
   return fmt::format("{}/{}", instance, event);
 }
 
+namespace {
+
+// "domain" of "dds_domain".
+bool is_part_of(std::string_view unknown, std::string_view known) noexcept {
+  const std::size_t at = known.find(unknown);
+  if (at == std::string_view::npos) return false;
+  const std::size_t end = at + unknown.size();
+  return (at == 0 || known[at - 1] == '_') && (end == known.size() || known[end] == '_');
+}
+
+}  // namespace
+
 std::string_view nearest_name(std::string_view unknown, std::span<const std::string_view> known) {
   // Further away than this is another word, not a typing error.
-  return nearest_name(unknown, known, unknown.size() / 3 + 1);
+  const std::string_view near = nearest_name(unknown, known, unknown.size() / 3 + 1);
+  if (!near.empty() || unknown.empty()) return near;
+  const auto whole = [&](std::string_view name) { return is_part_of(unknown, name); };
+  const auto found = std::ranges::find_if(known, whole);
+  const bool one = found != known.end() && std::none_of(found + 1, known.end(), whole);
+  return one ? *found : std::string_view();
 }
 
 std::string_view nearest_name(std::string_view unknown, std::span<const std::string_view> known,

@@ -50,7 +50,8 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 /// The object that holds the external event `event` of `instance` in the pool: "instance/event".
 [[nodiscard]] std::string event_object_name(std::string_view instance, std::string_view event);
 
-/// `known` that is most like `unknown`, or empty if none is near: for "did you mean".
+/// `known` that is most like `unknown`, else the only one with it as a word ("domain" of "dds_domain"), else
+/// empty: for "did you mean".
 [[nodiscard]] std::string_view nearest_name(std::string_view unknown,
                                             std::span<const std::string_view> known);
 /// The same, with no more than `most` characters to insert, remove or replace.

@@ -43,6 +43,12 @@ TEST(Names, NearestFindsTypingErrorsOnly) {
   EXPECT_EQ(nearest_name("cmpscheduletimer", kKnown), "CmpScheduleTimer");
   EXPECT_EQ(nearest_name("zebra", kKnown), "");
   EXPECT_EQ(nearest_name("x", {}), "");
+  EXPECT_EQ(nearest_name("", kKnown), "");
+  static constexpr std::string_view kKeys[] = {"name", "dds_domain", "state_dir", "run_dir"};
+  EXPECT_EQ(nearest_name("domain", kKeys), "dds_domain");
+  EXPECT_EQ(nearest_name("state", kKeys), "state_dir");
+  EXPECT_EQ(nearest_name("dir", kKeys), "");  // of two
+  EXPECT_EQ(nearest_name("omain", kKeys), "");
   EXPECT_EQ(nearest_name("CmpSchedle", kKnown, 1), "CmpSchedule");
   EXPECT_EQ(nearest_name("CmpSchdle", kKnown, 1), "");
 }
