@@ -91,6 +91,7 @@ void add_post_verb(const Command& plcctl, CliSession& session);
 void add_logs_verb(const Command& plcctl, CliSession& session);
 void add_wait_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
+void add_top_verb(const Command& plcctl, CliSession& session);
 void add_variable_verbs(const Command& plcctl, CliSession& session);
 void add_plant_verbs(const Command& plcctl, CliSession& session);
 void add_verify_verb(const Command& plcctl, CliSession& session);

@@ -216,6 +216,7 @@ int main(int argc, char** argv) {
   plchost::add_variable_verbs(plcctl, session);
   plchost::add_wait_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
+  plchost::add_top_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);
   plchost::add_plant_verbs(plcctl, session);
   plchost::add_verify_verb(plcctl, session);
