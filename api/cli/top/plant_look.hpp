@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What one host shows at a moment. A part that has not come within the time of a look is that of the look
+/// The status of one host at a moment. A part that has not come within the time of a look is that of the look
 /// before.
 struct HostLook {
   HostView host;

@@ -24,7 +24,7 @@ const LoadFigures& found_load(const std::map<std::string, LoadFigures>& loads, c
   return found == loads.end() ? none : found->second;
 }
 
-// Adds the loads of this look to those of before. What has none now is gone.
+// Adds the loads of this look to those of before. Names without one are gone.
 void take_loads(std::map<std::string, LoadFigures>& kept, const std::map<std::string, double>& loads) {
   std::erase_if(kept, [&](const auto& one) { return !loads.contains(one.first); });
   for (const auto& [name, load] : loads) {

@@ -19,7 +19,7 @@ namespace plchost {
 [[nodiscard]] std::optional<std::int64_t> percentile_between(const plc_DurationHistogram& before,
                                                              const plc_DurationHistogram& now);
 
-/// What counters say of the last seconds.
+/// The counters of a task over the last seconds.
 struct TaskFigures {
   double cycles_per_s = 0;
   double load_percent = 0;  ///< of a core: its cycles by their average execution

@@ -43,7 +43,7 @@ std::uint64_t exceptions_of(const HostLook& look, std::string_view instance) {
   return 0;
 }
 
-// Of a silent host nothing is known but what it said last.
+// All that is known of a silent host is old.
 Row state_of(const HostLook& look, const Row& row) {
   return look.host.silent ? Row("silent") : row.at("state");
 }

@@ -34,7 +34,7 @@ struct TopCommand {
   std::string done;  ///< "line1 of cell1 is started"
 };
 
-/// What the keys have led to, and how that is drawn. It knows neither terminal nor DDS.
+/// The state that the keys have led to, and its drawing. It knows neither terminal nor DDS.
 class TopView {
  public:
   explicit TopView(TrendStyle style) noexcept : style_(style) {}

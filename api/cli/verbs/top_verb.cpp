@@ -39,7 +39,7 @@ class Top {
       screen_.draw(view_.draw(screen_.width(), screen_.height()));
       if (const auto key = screen_.key(kKeyPatience)) {
         view_.press(*key, screen_.height() / 2);
-        // What is looked into now has figures of its own, at once.
+        // The instance that is looked into now has figures of its own, at once.
         if (view_.inside() != inside_) next_ = {};
       }
       begin_command();

@@ -24,7 +24,7 @@ echo "- the instances"
 see '1 host, 2 instances, 2 running'
 see 'line1 .*running .*CmpSchedule'
 
-echo "- a look into one: its tasks with what they do"
+echo "- a look into one: its tasks and their latencies"
 press Enter
 see 'cell1/line1'
 see 'NOW-P99(us)'
