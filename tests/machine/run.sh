@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Stories of the packages on a machine of its own: a bare Debian that boots systemd as process 1.
-#   tests/machine/run.sh [--packages FOLDER] [--before FOLDER] [--container | --rt] [SUITE]
+#   tests/machine/run.sh [--packages FOLDER] [--before FOLDER] [--container | --rt] [--power-cuts N] [SUITE]
 # SUITE: bookworm or trixie; default: the Debian of this machine. FOLDER: the packages for it, from manager/package.sh, which is
 # called without --packages. --before: the packages of a version before. The way back to them, and the upgrade from them, are then
 # stories, too. The machine is QEMU with Debian's kernel; --rt: with its real-time kernel, and set up by 'plcctl check host --fix';
-# --container: systemd-nspawn, in seconds. The Debian is kept in .build/machine; a story changes nothing in it.
+# --container: systemd-nspawn, in seconds. --power-cuts: QEMU is killed N times while the machine writes. The Debian is kept in
+# .build/machine; a story changes nothing in it.
 # As root. Exit code 77: no such machine can be made here, and nothing was tested.
 set -euo pipefail
 
-packages= before=
+packages= before= cuts=0
 kind=emulated kernel=linux-image-amd64 kernel_line=
 suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
 while [ $# -gt 0 ]; do
@@ -16,9 +17,10 @@ while [ $# -gt 0 ]; do
     --packages) packages=$(realpath -e "${2:?"--packages needs a folder"}") && shift ;;
     --before) before=$(realpath -e "${2:?"--before needs a folder"}") && shift ;;
     --container) kind=container ;;
+    --power-cuts) cuts=${2:?"--power-cuts needs a number"} && shift ;;
     --rt) kernel=linux-image-rt-amd64 ;;
     -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"; exit ;;
-    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages, --before, --container, --rt and --help" >&2; exit 2 ;;
+    -*) echo "tests/machine/run.sh: unknown option $1; allowed are --packages, --before, --container, --rt, --power-cuts and --help" >&2; exit 2 ;;
     *) suite=$1 ;;
   esac
   shift
@@ -125,6 +127,7 @@ Linux.Area.0.Size=8
 Linux.Area.0.Device=/var/lib/plchost/valves
 Linux.Area.0.SafeState=0xE5E5E5E5E5E5E5E5
 EOF
+[ "$cuts" -eq 0 ] || . tests/machine/power_cuts.sh
 
 has_booted() { [[ "$(on_machine systemctl is-system-running || true)" =~ running|degraded ]]; }
 machine_start
@@ -227,6 +230,12 @@ if [ "$kernel" = linux-image-rt-amd64 ]; then
   done
   echo "  of '$first' are left: $left"
   until_true 60 registers_are "$driven"
+  shown=$(instances)
+fi
+
+if [ "$cuts" -gt 0 ]; then
+  story "the power is cut $cuts times while an operator works: what was answered holds"
+  power_cuts "$cuts"
   shown=$(instances)
 fi
 
