@@ -45,7 +45,7 @@ last() {
     END { while (count > 0 && at[count] > end - age) count--; print count > 0 ? number[count] : 0 }' "$work/answers"
 }
 events() { plcctl list events --json | jq -r '.[] | select(.instance == "line1") | .event' | sed -n 's/^cut//p' | sort -n | paste -sd' '; }
-# What line2 is to be after step N.
+# line2_after STEP: its state and scheduler
 line2_after() {
   case $(($1 / 8 % 4)) in
     0) echo "running CmpSchedule" ;;
