@@ -42,7 +42,7 @@ EOF
 # last WORD [SECONDS]: the number in the last answer of that word; with SECONDS: of those that came so long before the last of all
 last() {
   awk -v word="$1" -v age="${2:-0}" '{ end = $1 } $2 == word { at[++count] = $1; number[count] = $3 }
-    END { while (count > 0 && at[count] > end - age) count--; print count > 0 ? number[count] : 0 }' "$work/answers"
+    END { while (count > 0 && at[count] > end - age) count--; print (count > 0) ? number[count] : 0 }' "$work/answers"
 }
 events() { plcctl list events --json | jq -r '.[] | select(.instance == "line1") | .event' | sed -n 's/^cut//p' | sort -n | paste -sd' '; }
 # line2_after STEP: its state and scheduler
@@ -90,13 +90,14 @@ looks_after_cut() {
 
 # power_cuts COUNT
 power_cuts() {
-  local cut step=0 seconds
+  local cut step=0 seconds longest=7
+  [ "$machine_is_emulated" = no ] || longest=60
   : >"$work/answers"
   for ((cut = 1; cut <= $1; cut++)); do
     { ssh_machine "sh /applications/operator.sh $((step > 0 ? step - 1 : 0))" </dev/null 2>/dev/null || true; } |
       while read -r answer; do echo "$EPOCHREALTIME $answer"; done >>"$work/answers" &
     operator=$!
-    seconds=$((RANDOM % 7)).$((RANDOM % 10))
+    seconds=$((RANDOM % longest)).$((RANDOM % 10))
     sleep "$seconds"
     cut_power
     wait "$operator" 2>/dev/null || true
