@@ -189,7 +189,7 @@ void BlockNode::set_hosts(std::vector<HostRange> hosts) {
     const std::scoped_lock lock(entry_mutex_);
     entry_.hosts = std::move(hosts);
   }
-  keep_record();
+  (void)keep_record();  // its router does it again, and tells why not
 }
 
 void BlockNode::set_remote_nodes(std::span<const RemoteNode> nodes) noexcept {
@@ -197,12 +197,12 @@ void BlockNode::set_remote_nodes(std::span<const RemoteNode> nodes) noexcept {
 }
 
 // A part that a stranger has changed is written again.
-void BlockNode::keep_record() {
+Result<void> BlockNode::keep_record() {
   const std::scoped_lock lock(entry_mutex_);
-  directory_.keep(life_, entry_);
   if (options_.host_number != 0) {
     directory_.layout().host_number.store(options_.host_number, std::memory_order_relaxed);
   }
+  return directory_.keep(life_, entry_);
 }
 
 Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {

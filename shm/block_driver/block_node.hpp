@@ -122,7 +122,7 @@ class BlockNode {
   SendResult put_to(std::uint16_t node, const BlockHeader& header,
                     std::span<const std::byte> contents) noexcept;
   void want_link(std::uint16_t node) noexcept;
-  void keep_record();
+  Result<void> keep_record();
 
   const NodeOptions options_;
   NodeDirectory directory_;

@@ -65,7 +65,6 @@ class BlockRouter {
   Topology topology_;
   DuplicateFilter filter_;
   std::array<NodeLife, kMaxNodes> lives_{};  // of the nodes that are there, as of the last refresh
-  std::array<std::int32_t, kMaxNodes> pids_{};
   std::uint64_t changes_seen_ = 0;
   TimePoint next_tick_{};
   std::uint32_t ticks_ = 0;

@@ -38,7 +38,11 @@ struct NodeRecord {
   std::uint32_t forwards = 0;        ///< 1: blocks between others may go through it
   std::uint32_t queue_slots = 0;     ///< of the links that it makes
   std::array<HostRange, kMaxHostRanges> hosts{};
+  /// NodeLocks::file() in which the process has locked its address. Another number: its program is of a
+  /// version that locked nothing, and left whatever it had in these bytes.
+  std::uint32_t locks_file = 0;
 };
+static_assert(sizeof(NodeRecord) == 128);
 
 /// The counts of a node, besides those of its links.
 struct NodeCounters {

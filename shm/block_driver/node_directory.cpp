@@ -55,12 +55,19 @@ bool has_good_header(const DirectoryLayout& layout) noexcept {
   return is_described(layout, kDirectoryKind) && layout.slot_count == kMaxNodes;
 }
 
-bool has_live_node(const DirectoryLayout& layout) noexcept {
-  return std::ranges::any_of(layout.slots, [](const NodeSlot& slot) {
-    const auto record = slot.record.read();
+bool is_locked_in(const NodeRecord& record, const NodeLocks* locks) noexcept {
+  return locks != nullptr && record.locks_file == locks->file();
+}
+
+bool has_live_node(const DirectoryLayout& layout, const NodeLocks& locks) noexcept {
+  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
+    if (locks.is_taken(node)) return true;
+    const auto record = layout.slots[node - 1U].record.read();
+    if (!record || !is_sane(*record) || is_locked_in(*record, &locks)) continue;
     // Of a version before only the number of the process lies where it does now.
-    return record && is_sane(*record) && !process_has_ended({.pid = record->process.pid}, ProcessLook::quick);
-  });
+    if (!process_has_ended({.pid = record->process.pid}, ProcessLook::quick)) return true;
+  }
+  return false;
 }
 
 Result<void> check_directory(const MemoryFile& file, const std::string& name) {
@@ -75,13 +82,13 @@ Result<void> check_directory(const MemoryFile& file, const std::string& name) {
 
 // A stranger may have written over it. Nodes that run write it again within a second; without them it is
 // nobody's, and we do. Nodes that do not are of another version.
-Result<void> mend_header(const MemoryFile& file, const std::string& name) {
+Result<void> mend_header(const MemoryFile& file, const std::string& name, const NodeLocks& locks) {
   constexpr auto kMendPatience = std::chrono::milliseconds(1500);
   if (file.bytes().size() != sizeof(DirectoryLayout)) return check_directory(file, name);
   const TimePoint deadline = MonotonicClock::now() + kMendPatience;
   while (!has_good_header(directory_in(file))) {
     PLCHOST_TRY_ASSIGN(const auto lock, DirectoryLock::acquire(name));
-    if (!has_live_node(directory_in(file))) return fill_directory(file.bytes());
+    if (!has_live_node(directory_in(file), locks)) return fill_directory(file.bytes());
     if (MonotonicClock::now() >= deadline) return check_directory(file, name);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -98,8 +105,9 @@ Result<NodeDirectory> NodeDirectory::open(std::string_view pool, std::string_vie
   PLCHOST_TRY(check_base(base));
   const std::string name = directory_name(pool, base);
   PLCHOST_TRY_ASSIGN(auto file, in_step("directory of nodes", open_or_make_directory(name)));
-  PLCHOST_TRY(mend_header(file, name));
-  return NodeDirectory(std::string(pool), std::string(base), std::move(file));
+  PLCHOST_TRY_ASSIGN(auto locks, in_step("directory of nodes", NodeLocks::open(name)));
+  PLCHOST_TRY(mend_header(file, name, *locks));
+  return NodeDirectory(std::string(pool), std::string(base), std::move(file), std::move(locks));
 }
 
 Result<NodeDirectory> NodeDirectory::open_to_read(std::string_view pool, std::string_view base) {
@@ -109,7 +117,7 @@ Result<NodeDirectory> NodeDirectory::open_to_read(std::string_view pool, std::st
                      in_step("directory of nodes",
                              MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_only)));
   PLCHOST_TRY(check_directory(file, name));
-  return NodeDirectory(std::string(pool), std::string(base), std::move(file));
+  return NodeDirectory(std::string(pool), std::string(base), std::move(file), nullptr);
 }
 
 void NodeDirectory::remove(std::string_view pool, std::string_view base) noexcept {
@@ -122,6 +130,7 @@ void NodeDirectory::remove(std::string_view pool, std::string_view base) noexcep
     if (file.starts_with(links)) MemoryFile::remove(file);
   }
   MemoryFile::remove(name);
+  NodeLocks::remove(name);
 }
 
 DirectoryLayout& NodeDirectory::layout() const noexcept {
@@ -152,8 +161,8 @@ void NodeDirectory::announce() noexcept {
 Result<std::uint16_t> NodeDirectory::choose(const NodeEntry& entry) const {
   if (const auto namesake = find(entry.name)) {
     return failure(ErrorCode::already_exists,
-                   fmt::format("node name '{}' is taken: process {} has it, with address {}", entry.name,
-                               record(*namesake).value_or(NodeRecord{}).process.pid, *namesake));
+                   fmt::format("node name '{}' is taken: {} has it, with address {}", entry.name,
+                               owner_text(*namesake), *namesake));
   }
   if (entry.forced_address == 0) return choose_free(entry.name);
   if (entry.forced_address > kMaxNodes) {
@@ -162,8 +171,14 @@ Result<std::uint16_t> NodeDirectory::choose(const NodeEntry& entry) const {
   }
   if (const auto owner = record(entry.forced_address)) {
     return failure(ErrorCode::already_exists,
-                   fmt::format("node address {} is taken: node '{}', process {}, has it",
-                               entry.forced_address, owner->name.view(), owner->process.pid));
+                   fmt::format("node address {} is taken: node '{}', {}, has it", entry.forced_address,
+                               owner->name.view(), owner_text(entry.forced_address)));
+  }
+  if (!is_free(entry.forced_address)) {
+    return failure(
+        ErrorCode::already_exists,
+        fmt::format("node address {} is taken: {} has it, whose record another program has wiped out",
+                    entry.forced_address, owner_text(entry.forced_address)));
   }
   return entry.forced_address;
 }
@@ -174,7 +189,7 @@ Result<std::uint16_t> NodeDirectory::choose_free(std::string_view name) const {
   std::uint16_t best = 0;
   int best_rank = 0;
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
-    if (record(node)) continue;
+    if (!is_free(node)) continue;
     const auto last = slot(node).record.read();
     if (last && last->name.view() == name) return node;
     const bool never_used = last && last->generation == 0;
@@ -186,6 +201,26 @@ Result<std::uint16_t> NodeDirectory::choose_free(std::string_view name) const {
   }
   if (best != 0) return best;
   return failure(ErrorCode::full, fmt::format("all {} node addresses are taken", kMaxNodes));
+}
+
+std::shared_ptr<NodeLocks> NodeDirectory::locks() const {
+  return locks_ != nullptr ? locks_ : NodeLocks::find(directory_name(pool_, base_));
+}
+
+std::string NodeDirectory::owner_text(std::uint16_t node) const {
+  const auto known = record(node);
+  const auto locks = this->locks();
+  if (known && !is_locked_in(*known, locks.get())) return fmt::format("process {}", known->process.pid);
+  const auto holder = locks != nullptr ? locks->holder(node) : std::nullopt;
+  if (!holder) return "a process that has just ended";
+  return holder->pid > 0 ? fmt::format("process {}", holder->pid) : "a process of another container";
+}
+
+bool NodeDirectory::has_ended(std::uint16_t node, ProcessLook look) const {
+  const auto known = record(node);
+  if (!known) return false;
+  const auto locks = this->locks();
+  return is_locked_in(*known, locks.get()) ? !locks->is_taken(node) : process_has_ended(known->process, look);
 }
 
 void NodeDirectory::write(std::uint16_t node, const NodeRecord& record) noexcept {
@@ -203,7 +238,7 @@ void NodeDirectory::remove_links(std::uint16_t node) const noexcept {
 bool NodeDirectory::reclaim_one(std::uint16_t node) {
   slot(node).record.recover();
   auto owner = record(node);
-  if (!owner || !process_has_ended(owner->process)) return false;
+  if (!owner || !has_ended(node)) return false;
   owner->process = {};
   write(node, *owner);
   remove_links(node);
@@ -228,11 +263,12 @@ std::uint32_t NodeDirectory::reclaim() {
 
 namespace {
 
-NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation) {
+NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation, std::uint32_t locks_file) {
   NodeRecord record;
   record.name.assign(entry.name);
   record.process = this_process();
   record.generation = generation;
+  record.locks_file = locks_file;
   record.forwards = entry.forwards ? 1 : 0;
   record.queue_slots = entry.queue_slots;
   std::copy_n(entry.hosts.begin(), std::min(entry.hosts.size(), kMaxHostRanges), record.hosts.begin());
@@ -241,8 +277,8 @@ NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation) {
 
 bool is_same(const NodeRecord& one, const NodeRecord& other) {
   return one.name.view() == other.name.view() && one.process == other.process &&
-         one.generation == other.generation && one.forwards == other.forwards &&
-         one.queue_slots == other.queue_slots && one.hosts == other.hosts;
+         one.generation == other.generation && one.locks_file == other.locks_file &&
+         one.forwards == other.forwards && one.queue_slots == other.queue_slots && one.hosts == other.hosts;
 }
 
 }  // namespace
@@ -258,13 +294,17 @@ Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
                                               DirectoryLock::acquire(directory_name(pool_, base_))));
   reclaim_locked();
   PLCHOST_TRY_ASSIGN(const auto node, choose(entry));
+  if (!locks_->take(node)) {
+    return failure(ErrorCode::busy,
+                   fmt::format("node address {} cannot be locked: {} has it", node, owner_text(node)));
+  }
   NodeSlot& place = slot(node);
   std::uint32_t generation = place.record.read().value_or(NodeRecord{}).generation + 1;
   if (generation == 0) ++generation;
   remove_links(node);
   for (auto& word : place.incoming) word.store(0, std::memory_order_relaxed);
   for (auto& word : place.neighbours) word.store(0, std::memory_order_relaxed);
-  write(node, record_of(entry, generation));
+  write(node, record_of(entry, generation, locks_->file()));
   announce();
   return NodeLife{.node = node, .generation = generation};
 }
@@ -277,20 +317,29 @@ void NodeDirectory::leave(const NodeLife& life) {
   owner->process = {};
   write(life.node, *owner);
   remove_links(life.node);
+  locks_->give_back(life.node);
   announce();
 }
 
-void NodeDirectory::keep(const NodeLife& life, const NodeEntry& entry) {
+Result<void> NodeDirectory::keep(const NodeLife& life, const NodeEntry& entry) {
   if (!has_good_header(layout())) (void)fill_directory(file_.bytes());
-  const NodeRecord wanted = record_of(entry, life.generation);
+  if (!locks_->take(life.node)) {
+    return failure(
+        ErrorCode::busy,
+        fmt::format("node '{}' may have lost its address {}: this program has closed {}, by whose "
+                    "lock others see that it runs. Start it again",
+                    entry.name, life.node, MemoryFile::path(node_locks_name(directory_name(pool_, base_)))));
+  }
+  const NodeRecord wanted = record_of(entry, life.generation, locks_->file());
   const auto is_ours = [&](const std::optional<NodeRecord>& owner) {
     return owner && is_same(*owner, wanted);
   };
-  if (is_ours(record(life.node))) return;
-  const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
-  if (!lock || is_ours(record(life.node))) return;
+  if (is_ours(record(life.node))) return {};
+  const auto held = DirectoryLock::acquire(directory_name(pool_, base_));
+  if (!held || is_ours(record(life.node))) return {};
   write(life.node, wanted);
   announce();
+  return {};
 }
 
 }  // namespace plchost

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -8,7 +9,9 @@
 #include "shm/base/result.hpp"
 #include "shm/block_driver/block_link.hpp"
 #include "shm/block_driver/directory_layout.hpp"
+#include "shm/block_driver/node_locks.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 
@@ -47,10 +50,18 @@ class NodeDirectory {
   void leave(const NodeLife& life);
   /// Writes the record of a node of this process again if it is not what it should be, and what the directory
   /// says of itself.
-  void keep(const NodeLife& life, const NodeEntry& entry);
+  /// busy: others cannot see any more that the process runs, as this program has closed the file of its lock.
+  [[nodiscard]] Result<void> keep(const NodeLife& life, const NodeEntry& entry);
   /// Takes the addresses from nodes whose processes have ended, and removes their links. Returns the number
   /// of these nodes.
   std::uint32_t reclaim();
+
+  /// Whether the process of that node has ended, by its lock. `look`: at one of a version before, which had
+  /// none. False: there is no node.
+  [[nodiscard]] bool has_ended(std::uint16_t node, ProcessLook look = ProcessLook::thorough) const;
+
+  /// "process 4711", as the caller sees the one of that node; or why there is no number.
+  [[nodiscard]] std::string owner_text(std::uint16_t node) const;
 
   /// Nothing: the address is free, or the record is not valid. Any context.
   [[nodiscard]] std::optional<NodeRecord> record(std::uint16_t node) const noexcept;
@@ -68,11 +79,17 @@ class NodeDirectory {
   [[nodiscard]] bool lost() const noexcept { return file_.lost(); }
 
  private:
-  NodeDirectory(std::string pool, std::string base, MemoryFile file) noexcept
-      : pool_(std::move(pool)), base_(std::move(base)), file_(std::move(file)) {}
+  NodeDirectory(std::string pool, std::string base, MemoryFile file,
+                std::shared_ptr<NodeLocks> locks) noexcept
+      : pool_(std::move(pool)), base_(std::move(base)), file_(std::move(file)), locks_(std::move(locks)) {}
   Result<std::uint16_t> choose(const NodeEntry& entry) const;
   Result<std::uint16_t> choose_free(std::string_view name) const;
   void write(std::uint16_t node, const NodeRecord& record) noexcept;
+  /// Whether the address is to be had. Its record may have been wiped out while its process runs.
+  [[nodiscard]] bool is_free(std::uint16_t node) const noexcept {
+    return !record(node) && !locks_->is_taken(node);
+  }
+  [[nodiscard]] std::shared_ptr<NodeLocks> locks() const;
   bool reclaim_one(std::uint16_t node);
   std::uint32_t reclaim_locked();
   void remove_links(std::uint16_t node) const noexcept;
@@ -80,6 +97,7 @@ class NodeDirectory {
   std::string pool_;
   std::string base_;
   MemoryFile file_;
+  std::shared_ptr<NodeLocks> locks_;  // null: it only reads, and looks for them when it is asked
 };
 
 }  // namespace plchost

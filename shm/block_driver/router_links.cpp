@@ -26,7 +26,7 @@ void BlockRouter::tick(TimePoint now) {
           "process "
           "is started again"});
   }
-  node_.keep_record();
+  if (const auto kept = node_.keep_record(); !kept) tell(kept.error());
   look_for_the_dead();
   if (ticks_ % kTicksPerAudit == 0) {
     refresh();
@@ -40,18 +40,18 @@ void BlockRouter::tick(TimePoint now) {
   tidy(now);
 }
 
-// A number that is gone is seen in the same tick. A thorough look reads a file, so each node has its turn.
+// A lock that is free is seen in the same tick. Of a node without one a thorough look reads a file, so each
+// of them has its turn.
 void BlockRouter::look_for_the_dead() {
+  const NodeDirectory& directory = node_.directory_;
   bool found = false;
-  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
-    if (lives_[node - 1U].generation == 0) continue;
-    found = found || process_has_ended({.pid = pids_[node - 1U]}, ProcessLook::quick);
+  for (std::uint16_t node = 1; node <= kMaxNodes && !found; ++node) {
+    found = lives_[node - 1U].generation != 0 && directory.has_ended(node, ProcessLook::quick);
   }
   for (std::uint32_t i = 0; i < kMaxNodes && !found; ++i) {
     suspect_ = static_cast<std::uint16_t>(suspect_ % kMaxNodes + 1);
-    const auto record = node_.directory_.record(suspect_);
-    if (!record || suspect_ == node_.life_.node) continue;
-    found = process_has_ended(record->process);
+    if (suspect_ == node_.life_.node || !directory.record(suspect_)) continue;
+    found = directory.has_ended(suspect_);
     break;
   }
   if (found && node_.directory_.reclaim() > 0) refresh();
@@ -82,7 +82,6 @@ void BlockRouter::refresh() {
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
     const auto record = directory.record(node);
     lives_[node - 1U] = {.node = node, .generation = record ? record->generation : 0};
-    pids_[node - 1U] = record ? record->process.pid : 0;
   }
   topology_ = topology_of(directory);
   publish_routes();

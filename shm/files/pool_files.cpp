@@ -59,6 +59,10 @@ std::optional<std::string> memory_of_file(std::string_view pool, std::string_vie
   return same ? std::optional(std::move(name)) : std::nullopt;
 }
 
+std::string node_locks_name(std::string_view directory) {
+  return fmt::format("{}%locks", directory);
+}
+
 void remove_pool_memories(std::string_view pool, std::span<const std::string> kept) noexcept {
   const std::string prefix = pool_memory_name(pool, "");
   const auto stays = [&](const std::string& file) {

@@ -31,6 +31,8 @@ std::optional<Owners> owners_of(std::string_view pool, const std::string& file) 
     constexpr std::string_view kOfInstances = ".retain";
     return memory->ends_with(kOfInstances) ? Owners::instances : Owners::writers_of_pool;
   }
+  if (file.starts_with(pool_memory_name(pool, "")) && file.ends_with(node_locks_name("")))
+    return Owners::writers_of_pool;
   const std::string downloads = fmt::format("{}.download.", pool);
   if (file == fmt::format("{}.posts", pool) || file.starts_with(downloads)) return Owners::api_server;
   const auto begins = [&](const std::string& begin) { return file.starts_with(begin); };

@@ -9,6 +9,7 @@
 
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/locked_byte.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/open_or_make.hpp"
 #include "shm/pool/process_pools.hpp"
@@ -25,15 +26,6 @@ MemoryRights rights_of_locks(const MemoryRights& pool) noexcept {
   if ((pool.mode & S_IWGRP) != 0) mode |= S_IRGRP | S_IWGRP;
   if ((pool.mode & S_IWOTH) != 0) mode |= S_IROTH | S_IWOTH;
   return {.owner = pool.owner, .group = pool.group, .mode = mode};
-}
-
-struct flock byte_of(std::uint32_t client) noexcept {
-  struct flock lock{};
-  lock.l_type = F_WRLCK;
-  lock.l_whence = SEEK_SET;
-  lock.l_start = static_cast<off_t>(client);
-  lock.l_len = 1;
-  return lock;
 }
 
 // Without opening it: the close would let go of the locks of this process.
@@ -138,8 +130,7 @@ std::uint32_t ClientLocks::take_number_locked(std::atomic<std::uint32_t>& number
   constexpr int kAttempts = 10'000;
   for (int i = 0; i < kAttempts; ++i) {
     const std::uint32_t next = numbers.fetch_add(1, std::memory_order_relaxed) % ClientMutex::kMaxClient + 1;
-    struct flock lock = byte_of(next);
-    if (::fcntl(fd_, F_SETLK, &lock) == 0) {
+    if (lock_byte(fd_, next)) {
       number_.store(next, std::memory_order_relaxed);
       return next;
     }
@@ -159,24 +150,20 @@ Result<void> ClientLocks::renew(std::atomic<std::uint32_t>& numbers) noexcept {
     fd_ = fd.release();
   }
   const std::uint32_t known = number_;
-  struct flock lock = byte_of(known);
-  if (known != 0 && ::fcntl(fd_, F_SETLK, &lock) == 0) return {};
+  if (known != 0 && lock_byte(fd_, known)) return {};
   number_ = 0;
   if (take_number_locked(numbers) != 0) return {};
   return failure(ErrorCode::system, fmt::format("cannot lock a byte of {}", path_), errno);
 }
 
-// Asked as the owner of an open file, so that the kernel also tells a lock of this process. A program that
-// closes what it has not opened may have another file there: in doubt the client lives, until renew().
+// A program that closes what it has not opened may have another file there: in doubt the client lives, until
+// renew().
 bool ClientLocks::lives(std::uint32_t client) const noexcept {
-  struct flock lock = byte_of(client);
-  return ::fcntl(fd_, F_OFD_GETLK, &lock) != 0 || lock.l_type != F_UNLCK || !is_open();
+  return holder_of_byte(fd_, client) || !is_open();
 }
 
 pid_t ClientLocks::seen_as(std::uint32_t client) const noexcept {
-  struct flock lock = byte_of(client);
-  const bool locked = ::fcntl(fd_, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
-  return locked && lock.l_pid > 0 ? lock.l_pid : 0;
+  return holder_of_byte(fd_, client).value_or(ByteHolder{}).pid;
 }
 
 }  // namespace plchost

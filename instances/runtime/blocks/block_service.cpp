@@ -7,7 +7,6 @@
 
 #include "shm/block_driver/node_directory.hpp"
 #include "shm/log/log.hpp"
-#include "shm/threads/process_start.hpp"
 
 namespace plchost {
 
@@ -23,11 +22,11 @@ Result<void> BlockService::check(const std::string& pool, const std::string& ins
   const auto directory = NodeDirectory::open_to_read(pool, settings.base);
   if (!directory) return {};  // no node has joined yet
   const auto owner = directory->record(settings.forced_address);
-  if (!owner || owner->name.view() == instance || process_has_ended(owner->process)) return {};
-  return failure(ErrorCode::busy,
-                 fmt::format("[CmpBlkDrvShm]: node address {} is taken: node '{}', process "
-                             "{}, has it",
-                             settings.forced_address, owner->name.view(), owner->process.pid));
+  if (!owner || owner->name.view() == instance || directory->has_ended(settings.forced_address)) return {};
+  return failure(
+      ErrorCode::busy,
+      fmt::format("[CmpBlkDrvShm]: node address {} is taken: node '{}', {}, has it", settings.forced_address,
+                  owner->name.view(), directory->owner_text(settings.forced_address)));
 }
 
 Result<void> BlockService::configure(const BlockSettings& settings) {

@@ -108,6 +108,7 @@ TEST_F(NodeDirectoryTest, WhoJoinsTakesTheForcedAddressOfADeadProcess) {
 TEST_F(NodeDirectoryTest, AnotherProcessOfTheSameNumberIsNotTakenForTheOldOne) {
   const NodeLife life = join("a").value();
   auto record = sut_.record(life.node).value();
+  record.locks_file = 0;      // of a version before, which is known by its number
   record.process.start -= 1;  // as if this process had got the number of one before it
   sut_.slot(life.node).record.write(record);
   EXPECT_EQ(sut_.reclaim(), 1U);
@@ -140,7 +141,7 @@ TEST_F(NodeDirectoryTest, ARecordThatAStrangerChangedIsWrittenAgain) {
     auto* const words = reinterpret_cast<std::uint64_t*>(&sut_.slot(life.node).record);
     std::fill_n(words + (half ? 0 : 1), 6, 0x4141414141414141);  // half: looks as if being written for ever
     EXPECT_FALSE(sut_.record(life.node).has_value() && sut_.record(life.node)->process.pid == ::getpid());
-    sut_.keep(life, entry);
+    ASSERT_TRUE(sut_.keep(life, entry));
     ASSERT_TRUE(sut_.record(life.node));
     EXPECT_EQ(sut_.record(life.node)->name.view(), "a");
   }
@@ -162,7 +163,7 @@ TEST_F(NodeDirectoryTest, OverWhichAStrangerHasWrittenIsMended) {
   sut_.layout().magic ^= 0x40;
   sut_.layout().version = 99;
   EXPECT_FALSE(NodeDirectory::open_to_read(pool_.get()));
-  sut_.keep(*life, entry);
+  ASSERT_TRUE(sut_.keep(*life, entry));
   EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by its user";
   sut_.layout().magic ^= 0x40;
   EXPECT_EQ(NodeDirectory::open(pool_.get()).error().code, ErrorCode::corrupt)
