@@ -318,7 +318,9 @@ bool container_by_environment() {
 
 std::string container_mark(const FixOrder& order) {
   if (std::string mark = host_check::container_mark(HostFiles(order.root)); !mark.empty()) return mark;
-  return order.root.empty() && container_by_environment() ? kFirstEnvironment : "";
+  if (!order.root.empty()) return "";
+  if (container_by_environment()) return kFirstEnvironment;
+  return host_check::has_its_own_processes(HostFiles()) ? "its PID namespace" : "";
 }
 
 bool do_order(const FixOrder& order, const ManagerConfig& config) {

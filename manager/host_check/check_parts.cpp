@@ -34,6 +34,10 @@ std::string container_mark(const HostFiles& files) {
   return {};
 }
 
+bool has_its_own_processes(const HostFiles& files) {
+  return files.exists("/proc/1/comm") && files.text("/proc/2/comm").value_or("") != "kthreadd";
+}
+
 std::optional<HostFinding> unless_on(const HostFiles& files, const std::string& path,
                                      const std::string& subject, const std::string& why) {
   if (files.kernel_lacks(path)) return finding(FindingLevel::ok, subject, "the kernel has none", why);

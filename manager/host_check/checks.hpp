@@ -59,6 +59,9 @@ HostFinding container(const CheckedHost& host);
 
 /// The file that says that this is a container; empty: none does.
 [[nodiscard]] std::string container_mark(const HostFiles& files);
+/// Whether process 2 is no thread of the kernel, as in each PID namespace but the first: a container, also of
+/// a runtime that leaves no such file (containerd, CRI-O).
+[[nodiscard]] bool has_its_own_processes(const HostFiles& files);
 
 /// Of a number of the kernel that switches something on: the finding when it is off, not there or not known.
 /// Nothing: it is on.

@@ -66,7 +66,8 @@ HostFinding container(const CheckedHost& host) {
   constexpr auto kSubject = "container";
   constexpr auto kWhy =
       "a container has the kernel, interrupts and idle states of the machine that it runs on";
-  const std::string mark = container_mark(host.files);
+  std::string mark = container_mark(host.files);
+  if (mark.empty() && has_its_own_processes(host.files)) mark = "its PID namespace";
   if (mark.empty()) return finding(FindingLevel::ok, kSubject, "none", kWhy);
   return finding(FindingLevel::note, kSubject, fmt::format("{} says that this is one", mark), kWhy,
                  "outside: set up the kernel, and give the container its rights, cores and /dev/shm "

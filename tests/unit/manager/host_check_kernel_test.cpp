@@ -166,6 +166,16 @@ TEST(HostCheckKernel, TellsAContainerByTheFileThatItsMakerHasPutThere) {
   EXPECT_EQ(tree.look("container").found, "/run/.containerenv says that this is one");
 }
 
+TEST(HostCheckKernel, TellsAContainerByItsPidNamespaceWhereItsMakerHasPutNoFile) {
+  const FakeTree tree;
+  tree.write("/proc/1/comm", "systemd\n");
+  tree.write("/proc/2/comm", "kthreadd\n");
+  EXPECT_EQ(tree.look("container").found, "none");
+  tree.write("/proc/2/comm", "plchostd\n");
+  EXPECT_EQ(tree.look("container").level, FindingLevel::note);
+  EXPECT_EQ(tree.look("container").found, "its PID namespace says that this is one");
+}
+
 TEST(HostCheckKernel, TellsAVirtualMachineAndWhatItLost) {
   const FakeTree tree;
   EXPECT_THAT(tree.look("machine").found, StartsWith("not known: "));
