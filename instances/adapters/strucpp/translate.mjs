@@ -249,9 +249,65 @@ function byPlace({ place: one }, { place: other }) {
   return one[0] - other[0] || one[1] - other[1] || one[2] - other[2];
 }
 
+// The values of characters in memory: bytes of UTF-8, or units of UTF-16.
+function valuesOf(characters, isWide) {
+  return isWide ? Array.from({ length: characters.length }, (_, i) => characters.charCodeAt(i)) : [...Buffer.from(characters, 'utf8')];
+}
+
+const kEscapes = { N: '\n', L: '\n', R: '\r', T: '\t', P: '\f' };
+
+// What IEC 61131-3 has of a text, without its quotes.
+function valuesOfText(inner, isWide) {
+  const part = isWide ? /\$(?:([\dA-F]{4})|(.))|([^$]+)/gis : /\$(?:([\dA-F]{2})|(.))|([^$]+)/gis;
+  return [...inner.matchAll(part)].flatMap(([, code, letter, plain]) => {
+    if (code !== undefined) return [parseInt(code, 16)];
+    return valuesOf(letter === undefined ? (isWide ? plain : plain.replaceAll("''", "'")) : (kEscapes[letter.toUpperCase()] ?? letter), isWide);
+  });
+}
+
+// What the C++ has that the compiler makes of it: a code takes all digits behind it, $" of a WSTRING is unknown to the compiler,
+// '' is one ' also between ", and the value ends with the first NUL. undefined: it does not compile.
+function valuesInCpp(inner, isWide) {
+  const part = /\$(?:([\dA-F]{2})|([NLRTP$']))|''|\$|([^$'][^$']*)|'/gis;
+  const made = [...inner.matchAll(part)].map(([all, code, letter, plain]) => {
+    if (code !== undefined) return { code };
+    if (letter !== undefined) return { plain: kEscapes[letter.toUpperCase()] ?? letter };
+    if (all === '$') return { plain: '\\$' };
+    return { plain: plain ?? "'" };
+  });
+  const values = [];
+  for (let i = 0; i < made.length; ++i) {
+    let { code, plain = '' } = made[i];
+    if (code !== undefined) {
+      const digits = /^[\dA-F]*/i.exec(made[i + 1]?.plain ?? '')[0];
+      const value = parseInt(code + digits, 16);
+      if (value > (isWide ? 0xffff : 0xff)) return undefined;
+      values.push(value);
+      if (digits !== '') made[i + 1].plain = made[i + 1].plain.slice(digits.length);
+    }
+    values.push(...valuesOf(plain, isWide));
+  }
+  const end = values.indexOf(0);
+  return end < 0 ? values : values.slice(0, end);
+}
+
+// Why a text becomes another one in C++; undefined: it does not.
+function textProblem(text, isWide) {
+  const isSame = (one) => String(valuesOfText(one.slice(1, -1), isWide)) === String(valuesInCpp(one.slice(1, -1), isWide));
+  if (isSame(text)) return undefined;
+  const values = valuesOfText(text.slice(1, -1), isWide);
+  if (values.includes(0)) return `STruC++ ends the text ${text} at the character ${isWide ? '$0000' : '$00'}; write it without`;
+  const coded = isWide ? text.replace(/\$([$LNPRT]|[\dA-F]{4})|\$"/gi, (all, other) => (other === undefined ? '$0022' : all)) : text;
+  if (coded !== text && isSame(coded)) return `STruC++ makes another text of ${text}: write $0022 in the place of $"`;
+  const why = coded !== text ? 'it does not know $"' : isWide && text.includes("''") ? "it makes one ' of ''" : 'it takes digits and letters behind a code for a part of that';
+  return `STruC++ makes another text of ${text}: ${why}`;
+}
+
 // Why a literal becomes another value in C++; undefined: it does not.
 function literalProblem(node, isInitial, nanosecondsOf) {
   if (node.kind !== 'LiteralExpression' || (node.typePrefix ?? '') !== '') return undefined;
+  const isWide = node.literalType === 'WSTRING';
+  if (isWide || node.literalType === 'STRING') return textProblem(node.rawValue, isWide);
   const text = asWritten(node, node.rawValue);
   if (node.literalType === 'INT' && !isInitial && !text.includes('#')) {
     const value = integerOf(node);
@@ -294,6 +350,8 @@ class Calls {
     this.plan = plan;
     this.types = new Map([...plan.ast.interfaces, ...plan.ast.functionBlocks].map((one) => [one.name.toUpperCase(), one]));
     this.functions = new Map(plan.ast.functions.map((pou) => [pou.name.toUpperCase(), pou]));
+    // What the initial values in a method can name, besides the globals.
+    this.scopes = new Map(plan.ast.functionBlocks.flatMap((block) => block.methods.map((method) => [method, plan.scopeOfBlock(block, new Map())])));
     this.problems = [];
     this.insertions = [];
     for (const { pou, body, scope, globals } of plan.bodies()) {
@@ -307,6 +365,7 @@ class Calls {
         else if (called !== undefined) this.completeFunction(node, called);
       }
     }
+    this.checkSignatures();
     this.insertions.sort((one, other) => other.number - one.number || other.line - one.line || other.column - one.column);
     // In the source, before anything is inserted.
     this.problems = this.problems.sort(byPlace).map(inCharacters).map(inSource);
@@ -320,6 +379,38 @@ class Calls {
     const bases = [known.extends ?? []].flat();
     return own ?? bases.map((base) => this.methodIn(base, name, depth + 1)).find((method) => method !== undefined);
   }
+  // A call has the order of the type that it names, and reaches a method of one that extends or implements that.
+  checkSignatures() {
+    for (const block of this.plan.ast.functionBlocks) {
+      const told = new Set();
+      for (const [method, type] of this.typesAbove(block).flatMap(({ methods, name }) => methods.map((one) => [one, name]))) {
+        const own = this.methodIn(block.name, method.name);
+        const isSame = own === undefined || String(this.signatureOf(own)) === String(this.signatureOf(method));
+        // An inherited one is told where it is declared, if it is wrong there already.
+        if (isSame || told.has(own) || (!block.methods.includes(own) && !this.isNewTo(block, type))) continue;
+        told.add(own);
+        this.problems.push({
+          place: placeOf(block.methods.includes(own) ? own : block),
+          text: `${own.name}: its parameters are not those of ${type}, and STruC++ ignores their names in calls; declare them as there: ${this.signatureOf(method).join(', ') || 'none'}`,
+        });
+      }
+    }
+  }
+  // All that a block extends or implements, also by way of another one.
+  typesAbove(type, depth = 0) {
+    const names = depth > kMostBases ? [] : [type.extends ?? [], type.implements ?? []].flat();
+    const above = names.map((name) => this.types.get(name.toUpperCase())).filter((one) => one !== undefined);
+    return above.flatMap((one) => [one, ...this.typesAbove(one, depth + 1)]);
+  }
+  // Not above the block that it extends.
+  isNewTo(block, type) {
+    const base = this.types.get(block.extends?.toUpperCase());
+    return base === undefined || (base.name !== type && !this.typesAbove(base).some(({ name }) => name === type));
+  }
+  signatureOf(method) {
+    return parametersOf(method).map(({ name, block, declaration }) => `${block.blockType} ${name} : ${this.plan.typeText(declaration.type)}`.toUpperCase());
+  }
+
   // That a call in this POU means; undefined: it is no call of a method.
   methodOf(node, pou, scope) {
     if (node.kind === 'MethodCallExpression') return this.methodIn(this.methodOf(node.object, pou, scope)?.returnType?.name, node.methodName);
@@ -330,10 +421,10 @@ class Calls {
     return this.methodIn(object === 'THIS' ? pou.name : scope.get(object)?.type, name);
   }
 
-  // The initial value as text; undefined: it has none, or one of its names means something else to the caller.
+  // The initial value as text; undefined: it has none, or one of its names means something else to the caller, or nothing.
   valueOf({ block, declaration }, called) {
     if (block.blockType !== 'VAR_INPUT' || declaration.initialValue === undefined) return undefined;
-    const own = this.plan.scopeOf(called.varBlocks, new Map());
+    const own = this.plan.scopeOf(called.varBlocks, this.scopes.get(called) ?? new Map());
     const names = [...nodesIn(declaration.initialValue)].filter(({ kind }) => kind === 'VariableExpression').map(({ name }) => name.toUpperCase());
     return names.every((name) => this.isSame(name) && (!own.has(name) || this.plan.types.has(name))) ? textOf(declaration.initialValue) : undefined;
   }
@@ -388,7 +479,7 @@ class Calls {
       const before = lines[number][line - 1];
       lines[number][line - 1] = before.slice(0, column - 1) + text + before.slice(column - 1);
       sources[number].text = lines[number].join('\n');
-      sources[number].inserted = [...(sources[number].inserted ?? []), { line, column: place[2], length: [...text].length }];
+      sources[number].inserted = [...(sources[number].inserted ?? []), { line, column: place[2], length: [...text].length, isInitial: true }];
       sources[number].inserted.sort((one, other) => one.line - other.line || one.column - other.column);
     }
     return added.length > 0;
@@ -923,11 +1014,14 @@ async function timesOfCompiler() {
 }
 
 // Of the source, without what was inserted.
-function inSource({ place: [file, line, column], ...rest }) {
+function inSource({ place: [file, line, column], text, ...rest }) {
+  let isInitial = false;
   for (const one of sources[file]?.inserted ?? []) {
-    if (one.line === line && one.column < column) column -= Math.min(one.length, column - one.column);
+    if (one.line !== line || one.column > column) continue;
+    isInitial ||= one.isInitial === true && column - one.column < one.length;
+    column -= Math.min(one.length, column - one.column);
   }
-  return { ...rest, place: [file, line, column] };
+  return { ...rest, place: [file, line, column], text: isInitial ? `${text}: the initial value of an input that this call leaves out; give the input` : text };
 }
 
 // The compiler counts units of UTF-16.

@@ -1,5 +1,8 @@
 #include "instances/runtime/memory/output_registers.hpp"
 
+#include <algorithm>
+#include <array>
+#include <ranges>
 #include <utility>
 
 namespace plchost {
@@ -9,21 +12,34 @@ OutputRegisters::OutputRegisters(std::span<std::byte> registers, std::vector<Byt
     : registers_(registers),
       ranges_(std::move(ranges)),
       safe_(std::move(safe)),
-      changed_(keeps() ? 0 : registers.size()) {
+      changed_(registers.size()) {
   for (std::size_t at = 0; at < changed_.size(); ++at)
     changed_[at].store(initial[at], std::memory_order_relaxed);
 }
 
-void OutputRegisters::change(std::size_t at, std::byte value) noexcept {
-  if (!keeps()) changed_[at].store(value, std::memory_order_relaxed);
-  if (!off()) write(at, std::span(&value, 1));
+void OutputRegisters::restore(ByteRange range) noexcept {
+  const std::size_t end = range.offset + range.bytes;
+  for (std::size_t at = range.offset; at < end;) {
+    const std::size_t next = std::min(end, at - at % kPart + kPart);
+    restore_part({.offset = at, .bytes = next - at});
+    at = next;
+  }
 }
 
-void OutputRegisters::restore(ByteRange range) noexcept {
-  if (keeps()) return;
-  for (std::size_t at = range.offset; at < range.offset + range.bytes; ++at) {
-    const std::byte value = changed_[at].load(std::memory_order_relaxed);
-    write(at, std::span(&value, 1));
+// Another task may note a value and write it meanwhile: that one stays. It does so once a cycle.
+void OutputRegisters::restore_part(ByteRange range) noexcept {
+  std::array<std::byte, kPart> values{};
+  const std::span part = std::span(values).first(range.bytes);
+  const auto is_noted = [&](std::size_t i) {
+    return changed_[range.offset + i].load(std::memory_order_relaxed) == part[i];
+  };
+  bool is_last = false;
+  while (!is_last) {
+    for (std::size_t i = 0; i < range.bytes; ++i)
+      part[i] = changed_[range.offset + i].load(std::memory_order_relaxed);
+    write(range.offset, part);
+    publish();
+    is_last = std::ranges::all_of(std::views::iota(std::size_t{0}, range.bytes), is_noted);
   }
 }
 

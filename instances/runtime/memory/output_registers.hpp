@@ -13,8 +13,8 @@ namespace plchost {
 /// Outputs that are registers of a device: they have no image, and cannot be read back.
 class OutputRegisters {
  public:
-  /// `ranges`: where outputs lie in `registers`, which have `initial` values as far as tasks know. `safe`:
-  /// their safe values, as many as registers; empty: they are kept as they are. Set-up.
+  /// `ranges`: where outputs lie in `registers`. Tasks begin with `initial`, whatever the registers have.
+  /// `safe`: their safe values, as many as registers; empty: they are kept as they are. Set-up.
   OutputRegisters(std::span<std::byte> registers, std::vector<ByteRange> ranges,
                   std::span<const std::byte> initial, std::vector<std::byte> safe);
 
@@ -25,9 +25,14 @@ class OutputRegisters {
   void write(std::size_t at, std::span<const std::byte> bytes) noexcept {
     copy_to_registers(registers_.subspan(at, bytes.size()), bytes);
   }
-  /// Of bytes that several tasks change. While they are off it is kept for restore().
-  void change(std::size_t at, std::byte value) noexcept;
-  /// Writes them as they were changed last.
+  /// Of bytes that several tasks change: keeps the value for restore(). Once all of a cycle are noted and
+  /// publish() was called, they are to be written, unless they are off.
+  void note(std::size_t at, std::byte value) noexcept {
+    changed_[at].store(value, std::memory_order_relaxed);
+  }
+  /// Pairs with restore(): either that sees what was noted, or it is written after that.
+  static void publish() noexcept { std::atomic_thread_fence(std::memory_order_seq_cst); }
+  /// Writes them as they were noted last; those that never were have their initial values.
   void restore(ByteRange range) noexcept;
 
   /// Tasks write nothing more, but for one that is just doing so. Writes the safe values; to be repeated when
@@ -43,6 +48,9 @@ class OutputRegisters {
   [[nodiscard]] std::span<const std::byte> safe() const noexcept { return safe_; }
 
  private:
+  static constexpr std::size_t kPart = 64;  // that is written as one
+  void restore_part(ByteRange range) noexcept;
+
   std::span<std::byte> registers_;
   std::vector<ByteRange> ranges_;
   std::vector<std::byte> safe_;

@@ -53,7 +53,8 @@ void OutputView::refresh() noexcept {
 }
 
 void OutputView::begin_cycle() noexcept {
-  if (writes_.sole) return;
+  // Registers: what was written between the cycles, by an operator, is a change.
+  if (writes_.sole || registers_ != nullptr) return;
   // A value that is not out yet is still a change.
   if (late_) return;
   if (image_ != nullptr) refresh();
@@ -92,12 +93,34 @@ void OutputView::write_registers() noexcept {
   if (!off) {
     for (const ByteRange own : writes_.own) registers_->write(own.offset, part(bytes_, own));
   }
+  // The first cycle since a start also puts out what nobody changes: the registers have other values yet.
   const bool restores = !off && armed_.exchange(false, std::memory_order_relaxed);
+  if (note_changes()) OutputRegisters::publish();
+  for (const ByteRange shared : writes_.shared) {
+    if (restores) {
+      registers_->restore(shared);
+    } else {
+      write_changes(shared);
+    }
+    std::ranges::copy(part(bytes_, shared), part(base_, shared).begin());
+  }
+}
+
+bool OutputView::note_changes() noexcept {
+  bool has_changed = false;
   for (const ByteRange shared : writes_.shared) {
     for (std::size_t at = shared.offset; at < shared.offset + shared.bytes; ++at) {
-      if (bytes_[at] != base_[at]) registers_->change(at, bytes_[at]);
+      if (bytes_[at] == base_[at]) continue;
+      registers_->note(at, bytes_[at]);
+      has_changed = true;
     }
-    if (restores) registers_->restore(shared);
+  }
+  return has_changed;
+}
+
+void OutputView::write_changes(ByteRange shared) noexcept {
+  for (std::size_t at = shared.offset; at < shared.offset + shared.bytes; ++at) {
+    if (bytes_[at] != base_[at] && !registers_->off()) registers_->write(at, std::span(&bytes_[at], 1));
   }
 }
 

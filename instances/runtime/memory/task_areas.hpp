@@ -69,10 +69,12 @@ class OutputView {
  private:
   void refresh() noexcept;
   void write_registers() noexcept;
+  bool note_changes() noexcept;
+  void write_changes(ByteRange shared) noexcept;
   void lay_over(std::span<std::byte> target) const noexcept;
 
   std::vector<std::byte> bytes_;
-  std::vector<std::byte> base_;  // bytes_ at the start of the cycle
+  std::vector<std::byte> base_;  // bytes_ at the start of the cycle; of registers at the end of the last one
   std::vector<std::byte> scratch_;
   Writes writes_;
   OutputImage* image_ = nullptr;

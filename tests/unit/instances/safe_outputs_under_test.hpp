@@ -76,18 +76,20 @@ class SafeOutputsOfAreas : public AreasUnderTest {
 class SafeRegisters : public SafeOutputsOfAreas {
  protected:
   ~SafeRegisters() override { std::remove(file_.c_str()); }
-  void place_registers(const std::string& safe) {
+  /// `safe`: empty: the settings name none.
+  void place_registers(const std::string& safe, unsigned initial = 0) {
     std::ofstream(file_, std::ios::binary) << std::string(64, '\x07');
     task("One", [this] {
       words(one)[0] = value;
       if (changes) words(one)[2] = value + 2;
     });
     task("Two", [this] { words(two)[1] = value + 1; });
-    declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}});
+    const Words initials{initial, initial, initial};
+    declare("out", PLC_AREA_OUTPUT, 12, {{"One", 0, 4, &one}, {"Two", 4, 4, &two}}, nullptr, initials.data());
     const auto placed = place_only(
         fmt::format("[SysMem]\nLinux.Area.0.Flags=8\nLinux.Area.0.Address=8\nLinux.Area.0.Device={}\n"
-                    "Linux.Area.0.Size=12\nLinux.Area.0.SafeState={}\n",
-                    file_, safe));
+                    "Linux.Area.0.Size=12\n{}",
+                    file_, safe.empty() ? "" : "Linux.Area.0.SafeState=" + safe + "\n"));
     ASSERT_TRUE(placed) << placed.error().describe();
     ASSERT_TRUE(sut.keep());
   }
