@@ -116,5 +116,57 @@ TEST_F(DifferencesOfStrucpp, ADifferenceThatWrapsWhereItIsComparedIsTold) {
   EXPECT_THAT(end.output, Not(HasSubstr("other.st:6:")));
 }
 
+// A caller knows other variables of these names, or none.
+TEST_F(DifferencesOfStrucpp, InitialValuesThatNameAConstantOfTheBlockAreNotTakenForAGlobal) {
+  const ProgramEnd end = built("b : Base; h : Heir; i : INT;",
+                               "i := b.Join(b := 2); i := h.More();\ni := b.Join();\ni := b.Odd();\n"
+                               "i := b.Join(a := 1) + h.More(2) + b.Odd(3);",
+                               "VAR_GLOBAL CONSTANT kMost : INT := 9; END_VAR FUNCTION_BLOCK Base VAR CONSTANT kMost : INT := "
+                               "5; END_VAR METHOD PUBLIC Join : INT VAR_INPUT a : INT := kMost; b : INT := 8; END_VAR "
+                               "Join := a + b; END_METHOD METHOD PUBLIC Odd : INT VAR_INPUT a : INT := kNone; END_VAR "
+                               "Odd := a; END_METHOD END_FUNCTION_BLOCK FUNCTION_BLOCK Heir EXTENDS Base METHOD "
+                               "PUBLIC More : INT VAR_INPUT a : INT := kMost; END_VAR More := a; END_METHOD "
+                               "END_FUNCTION_BLOCK");
+  EXPECT_FALSE(end.success());
+  expect_told(end, {"other.st:4:6: JOIN: STruC++ wants each parameter in this call of a method; add A := ...",
+                    "other.st:4:27: MORE: STruC++ wants each parameter in this call of a method; add A := ...",
+                    "other.st:5:6: JOIN: STruC++ wants each parameter in this call of a method; add A := ...",
+                    "other.st:6:12: Undeclared variable 'KNONE': the initial value of an input that this "
+                    "call leaves out; give the input"});
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:7:")));
+}
+
+// A call of the type above would pass its arguments in another order.
+TEST_F(DifferencesOfStrucpp, AMethodWithOtherParametersThanTheOneThatItStandsForIsRefused) {
+  const ProgramEnd end = build(R"(INTERFACE Goes METHOD Go : INT VAR_INPUT x : INT; y : INT; END_VAR END_METHOD END_INTERFACE
+INTERFACE Walks EXTENDS Goes METHOD Walk : INT VAR_INPUT x : INT; END_VAR END_METHOD END_INTERFACE
+FUNCTION_BLOCK Base
+METHOD PUBLIC Go : INT VAR_INPUT y : INT; x : INT; END_VAR Go := x; END_METHOD
+METHOD PUBLIC Fine : INT VAR_INPUT y : INT; END_VAR VAR_IN_OUT x : INT; END_VAR Fine := x; END_METHOD
+METHOD PUBLIC Walk : INT VAR_INPUT x : INT; END_VAR Walk := x; END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Heir EXTENDS Base IMPLEMENTS Walks
+METHOD PUBLIC OVERRIDE Fine : INT VAR_INPUT Y : INT := 3; END_VAR VAR_IN_OUT X : INT; END_VAR VAR q : INT; END_VAR Fine := q; END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Next EXTENDS Heir
+METHOD PUBLIC Fine : INT VAR_INPUT y : DINT; END_VAR VAR_IN_OUT x : INT; END_VAR Fine := x; END_METHOD
+METHOD PUBLIC OVERRIDE Walk : INT VAR_INPUT z : INT; END_VAR Walk := z; END_METHOD
+END_FUNCTION_BLOCK
+FUNCTION_BLOCK Other IMPLEMENTS Goes
+METHOD PUBLIC Go : INT VAR_INPUT x : INT; END_VAR VAR_IN_OUT y : INT; END_VAR Go := x; END_METHOD
+END_FUNCTION_BLOCK
+PROGRAM Prg VAR n : Next; END_VAR n(); END_PROGRAM
+CONFIGURATION k )" + kTask,
+                               "other", "strucpp");
+  EXPECT_FALSE(end.success());
+  const auto told = [](const char* place, const char* method, const char* type) {
+    return fmt::format("other.st:{}: {}: its parameters are not those of {},", place, method, type);
+  };
+  expect_told(end, {told("8:1", "GO", "GOES").c_str(), told("12:1", "FINE", "HEIR").c_str(),
+                    told("13:1", "WALK", "BASE").c_str(), told("16:1", "GO", "GOES").c_str(),
+                    "declare them as there: VAR_INPUT Y : INT, VAR_IN_OUT X : INT"});
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:9:")));
+}
+
 }  // namespace
 }  // namespace plchost::testing
