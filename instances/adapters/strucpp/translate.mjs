@@ -249,9 +249,65 @@ function byPlace({ place: one }, { place: other }) {
   return one[0] - other[0] || one[1] - other[1] || one[2] - other[2];
 }
 
+// The values of characters in memory: bytes of UTF-8, or units of UTF-16.
+function valuesOf(characters, isWide) {
+  return isWide ? Array.from({ length: characters.length }, (_, i) => characters.charCodeAt(i)) : [...Buffer.from(characters, 'utf8')];
+}
+
+const kEscapes = { N: '\n', L: '\n', R: '\r', T: '\t', P: '\f' };
+
+// What IEC 61131-3 has of a text, without its quotes.
+function valuesOfText(inner, isWide) {
+  const part = isWide ? /\$(?:([\dA-F]{4})|(.))|([^$]+)/gis : /\$(?:([\dA-F]{2})|(.))|([^$]+)/gis;
+  return [...inner.matchAll(part)].flatMap(([, code, letter, plain]) => {
+    if (code !== undefined) return [parseInt(code, 16)];
+    return valuesOf(letter === undefined ? (isWide ? plain : plain.replaceAll("''", "'")) : (kEscapes[letter.toUpperCase()] ?? letter), isWide);
+  });
+}
+
+// What the C++ has that the compiler makes of it: a code takes all digits behind it, $" of a WSTRING is unknown to the compiler,
+// '' is one ' also between ", and the value ends with the first NUL. undefined: it does not compile.
+function valuesInCpp(inner, isWide) {
+  const part = /\$(?:([\dA-F]{2})|([NLRTP$']))|''|\$|([^$'][^$']*)|'/gis;
+  const made = [...inner.matchAll(part)].map(([all, code, letter, plain]) => {
+    if (code !== undefined) return { code };
+    if (letter !== undefined) return { plain: kEscapes[letter.toUpperCase()] ?? letter };
+    if (all === '$') return { plain: '\\$' };
+    return { plain: plain ?? "'" };
+  });
+  const values = [];
+  for (let i = 0; i < made.length; ++i) {
+    let { code, plain = '' } = made[i];
+    if (code !== undefined) {
+      const digits = /^[\dA-F]*/i.exec(made[i + 1]?.plain ?? '')[0];
+      const value = parseInt(code + digits, 16);
+      if (value > (isWide ? 0xffff : 0xff)) return undefined;
+      values.push(value);
+      if (digits !== '') made[i + 1].plain = made[i + 1].plain.slice(digits.length);
+    }
+    values.push(...valuesOf(plain, isWide));
+  }
+  const end = values.indexOf(0);
+  return end < 0 ? values : values.slice(0, end);
+}
+
+// Why a text becomes another one in C++; undefined: it does not.
+function textProblem(text, isWide) {
+  const isSame = (one) => String(valuesOfText(one.slice(1, -1), isWide)) === String(valuesInCpp(one.slice(1, -1), isWide));
+  if (isSame(text)) return undefined;
+  const values = valuesOfText(text.slice(1, -1), isWide);
+  if (values.includes(0)) return `STruC++ ends the text ${text} at the character ${isWide ? '$0000' : '$00'}; write it without`;
+  const coded = isWide ? text.replace(/\$([$LNPRT]|[\dA-F]{4})|\$"/gi, (all, other) => (other === undefined ? '$0022' : all)) : text;
+  if (coded !== text && isSame(coded)) return `STruC++ makes another text of ${text}: write $0022 in the place of $"`;
+  const why = coded !== text ? 'it does not know $"' : isWide && text.includes("''") ? "it makes one ' of ''" : 'it takes digits and letters behind a code for a part of that';
+  return `STruC++ makes another text of ${text}: ${why}`;
+}
+
 // Why a literal becomes another value in C++; undefined: it does not.
 function literalProblem(node, isInitial, nanosecondsOf) {
   if (node.kind !== 'LiteralExpression' || (node.typePrefix ?? '') !== '') return undefined;
+  const isWide = node.literalType === 'WSTRING';
+  if (isWide || node.literalType === 'STRING') return textProblem(node.rawValue, isWide);
   const text = asWritten(node, node.rawValue);
   if (node.literalType === 'INT' && !isInitial && !text.includes('#')) {
     const value = integerOf(node);

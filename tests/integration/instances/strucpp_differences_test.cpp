@@ -168,5 +168,27 @@ CONFIGURATION k )" + kTask,
   EXPECT_THAT(end.output, Not(HasSubstr("other.st:9:")));
 }
 
+TEST_F(DifferencesOfStrucpp, TextsThatItMakesOthersOfAreRefused) {
+  const ProgramEnd end = built("w, v : WSTRING(9) := \"q$\"q\"; s : STRING(9) := '$C3$A4$00z';",
+                               R"(w := "$$$"";
+w := "it''s";
+w := "$0041B";
+w := "$"a";
+s := '$41B';
+s := '$00';
+w := "$0041z$20AC"; w := "\$$"; w := "ä€😀'"; s := 'it''s$'\$$"'; s := '$C3$A4$N$l'; s := '$41$42 C';)");
+  EXPECT_FALSE(end.success());
+  const char* const takes_more = "it takes digits and letters behind a code for a part of that";
+  expect_told(end, {R"(other.st:3:26: STruC++ makes another text of "q$"q": write $0022 in the place of $")",
+                    "other.st:3:51: STruC++ ends the text '$C3$A4$00z' at the character $00",
+                    R"(other.st:4:6: STruC++ makes another text of "$$$"": write $0022 in the place of $")",
+                    R"(other.st:5:6: STruC++ makes another text of "it''s": it makes one ' of '')",
+                    R"(other.st:7:6: STruC++ makes another text of "$"a": it does not know $")",
+                    "other.st:9:6: STruC++ ends the text '$00' at the character $00",
+                    fmt::format(R"(other.st:6:6: STruC++ makes another text of "$0041B": {})", takes_more).c_str(),
+                    fmt::format("other.st:8:6: STruC++ makes another text of '$41B': {}", takes_more).c_str()});
+  EXPECT_THAT(end.output, Not(HasSubstr("other.st:10:")));
+}
+
 }  // namespace
 }  // namespace plchost::testing
