@@ -82,7 +82,7 @@ typedef void(CDECL* PLC_TASK_FUNCTION)(void);
  * bit). The runtime writes the t... fields after each cycle, all in microseconds, so it must not be const.
  * Cycle time is the execution time of one cycle. Jitter is (start - start before) - interval, signed;
  * tJitterMax is the one of largest magnitude; both stay 0 unless the task is cyclic. A value that does not
- * fit is cut to the nearest int.
+ * fit is cut to the nearest int. tLastCycleTime is -1 when a fault or a watchdog has stopped the task alone.
  *
  * The functions have no argument. Data of one task are kept in static variables of its function. If several
  * tasks share a function, plc_current_task() tells them apart.

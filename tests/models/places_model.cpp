@@ -8,8 +8,12 @@
 //   area and the program have it.
 // * If firmware writes before a task has put its assigned value, that one holds. In each case the area
 //   and the program have one value after the next cycle.
-// * If two tasks and firmware each set a bit of one byte, all three are set.
+// * If two tasks and firmware each set a bit of one byte, all three are set. A task that has the byte changes
+//   no other bit than those that it assigns.
+// * The bits of one byte in a task's places are the same in all of them, and go to the firmware once.
+// * No value goes out that a task has in the midst of its cycle.
 
+#include <array>
 #include <cstring>
 #include <functional>
 
@@ -24,6 +28,7 @@ struct Program {
   unsigned word;
   unsigned char first;
   unsigned char second;
+  unsigned char byte;
 };
 Program program;
 
@@ -34,16 +39,28 @@ struct alignas(8) Area {
 };
 Area area;
 
-plchost_use low_word{.place = 0, .value = &program.word, .others = 0, .before = 0};
+plchost_use use_of(unsigned place, void* value, unsigned next = 0) {
+  plchost_use use{};
+  use.place = place;
+  use.value = value;
+  use.next = next;
+  return use;
+}
+plchost_use low_word = use_of(0, &program.word);
 plchost_use high_word = low_word;
-plchost_use first_bit{.place = 1, .value = &program.first, .others = 0, .before = 0};
-plchost_use second_bit{.place = 2, .value = &program.second, .others = 0, .before = 0};
+plchost_use first_bit = use_of(1, &program.first);
+plchost_use second_bit = use_of(2, &program.second);
+plchost_use byte_alone = use_of(3, &program.byte);
+// They share bits, the widest one first.
+std::array low_bits{use_of(3, &program.byte, 1), use_of(1, &program.first, 0)};
+std::array high_bits = low_bits;
 
-plchost_task task_that_has(const char* name, plchost_use* use) {
+plchost_task task_that_has(const char* name, plchost_use* uses, unsigned count = 1) {
   plchost_task task{};
   task.name = name;
-  task.uses_count = 1;
-  task.uses = use;
+  task.uses_count = count;
+  task.uses = uses;
+  task.sharing_count = count == 1 ? 0 : count;
   return task;
 }
 
@@ -51,17 +68,22 @@ plchost_task task_that_has(const char* name, plchost_use* use) {
 
 // The file that plcctl writes.
 extern "C" {
-const unsigned int plchost_place_count = 3;
+const unsigned int plchost_place_count = 4;
 const plchost_place plchost_places[] = {{"__MD1", 'M', 4, -1, 0, 4, &program.word},
-                                        {"__MX0_0", 'M', 1, 0, 0, 0, &program.first},
-                                        {"__MX0_1", 'M', 1, 1, 0, 0, &program.second}};
-unsigned long long plchost_exchanged[3];
+                                        {"__MX0_0", 'M', 1, 0, 1, 0, &program.first},
+                                        {"__MX0_1", 'M', 1, 1, 1, 0, &program.second},
+                                        {"__MB0", 'M', 1, -1, 1, 0, &program.byte}};
+unsigned long long plchost_exchanged[4];
 const unsigned int plchost_location_count = 0;
 const plchost_location plchost_locations[] = {{"", 0}};
-const unsigned int plchost_task_count = 4;
-const plchost_task plchost_tasks[] = {task_that_has("low", &low_word), task_that_has("high", &high_word),
+const unsigned int plchost_task_count = 7;
+const plchost_task plchost_tasks[] = {task_that_has("low", &low_word),
+                                      task_that_has("high", &high_word),
                                       task_that_has("first bit", &first_bit),
-                                      task_that_has("second bit", &second_bit)};
+                                      task_that_has("second bit", &second_bit),
+                                      task_that_has("byte", &byte_alone),
+                                      task_that_has("low bits", low_bits.data(), 2),
+                                      task_that_has("high bits", high_bits.data(), 2)};
 
 // The runtime.
 RTS_HANDLE plc_declare_area(const Plc_Area* declared, RTS_RESULT* /*result*/) {
@@ -78,12 +100,15 @@ RTS_RESULT plc_keep_variables(const char* /*name*/, void* /*address*/, unsigned 
 int plc_online_change() {
   return 0;
 }
+int plchost_is_stopped(unsigned /*task*/) {
+  return 0;
+}
 }
 
 namespace plchost::models {
 namespace {
 
-enum Task : unsigned { kLow, kHigh, kFirstBit, kSecondBit };
+enum Task : unsigned { kLow, kHigh, kFirstBit, kSecondBit, kByte, kLowBits, kHighBits };
 
 constexpr ThreadOptions kOnTheCore{.core = 0};
 
@@ -104,6 +129,10 @@ void write_by_firmware(unsigned value) {
 }
 
 void set_up(Scene& scene) {
+  plchost_forget_places();
+  for (auto* const bits : {&low_bits, &high_bits}) {
+    for (plchost_use& use : *bits) use.seen = 0;
+  }
   program = {};
   area = {};
   for (unsigned long long& exchanged : plchost_exchanged) exchanged = 0;
@@ -217,6 +246,101 @@ void bits_of_one_byte(Scene& scene) {
   scene.at_end([] { require(area.bits == 7, "a bit is lost"); });
 }
 
+template <class T>
+T now(const T& value) {
+  return __atomic_load_n(&value, __ATOMIC_RELAXED);
+}
+void assign_bits(Task task, unsigned char& variable, unsigned char value) {
+  plchost_assign_place(&plchost_tasks[task], &variable, &value);
+}
+
+void a_bit_beside_its_byte(Scene& scene) {
+  set_up(scene);
+  scene.thread(
+      "byte",
+      [] {
+        cycle(kByte, [] {
+          __atomic_store_n(&program.byte, static_cast<unsigned char>(now(program.byte) ^ 0x80U),
+                           __ATOMIC_RELAXED);
+        });
+      },
+      kOnTheCore);
+  scene.thread(
+      "first", [] { cycle(kFirstBit, [] { __atomic_store_n(&program.first, 1, __ATOMIC_RELAXED); }); },
+      kOnTheCore);
+  scene.thread("firmware", [] { __atomic_fetch_or(&area.bits, 4, __ATOMIC_RELAXED); }, kOnTheCore);
+  scene.at_end([] {
+    require(area.bits == 0x85, "a bit is lost");
+    cycle(kByte);
+    cycle(kFirstBit);
+    require(area.bits == 0x85 && program.byte == 0x85 && program.first == 1, "a bit is undone");
+  });
+}
+
+// Both have the byte and its first bit.
+void two_tasks_assign_shared_bits(Scene& scene) {
+  set_up(scene);
+  scene.thread("low", [] { assign_bits(kLowBits, program.first, 1); }, kOnTheCore);
+  scene.thread("high", [] { assign_bits(kHighBits, program.first, 0); }, kOnTheCore);
+  scene.at_end([] {
+    require(program.first == (program.byte & 1U), "places that share bits have two values");
+    observe(program.first);
+  });
+  scene.outcomes(1U << 0U | 1U << 1U);
+}
+
+void two_tasks_put_shared_bits(Scene& scene) {
+  set_up(scene);
+  plchost_take_places(&plchost_tasks[kLowBits]);
+  assign_bits(kLowBits, program.byte, 0x80);
+  scene.thread("low", [] { plchost_put_places(&plchost_tasks[kLowBits]); }, kOnTheCore);
+  scene.thread(
+      "high", [] { cycle(kHighBits, [] { assign_bits(kHighBits, program.first, 1); }); }, kOnTheCore);
+  scene.at_end([] {
+    require(program.first == 1 && program.byte == 0x81, "an assigned value is undone");
+    require(area.bits == 0x81, "the area has not the value that was assigned last");
+  });
+}
+
+// A request that the firmware resets when it sees it.
+void firmware_resets_a_bit(Scene& scene) {
+  set_up(scene);
+  auto& seen = scene.make<unsigned>();
+  scene.thread("low", [] { cycle(kLowBits, [] { assign_bits(kLowBits, program.first, 1); }); }, kOnTheCore);
+  scene.thread(
+      "firmware",
+      [&] { seen += __atomic_fetch_and(&area.bits, static_cast<unsigned char>(~1U), __ATOMIC_RELAXED) & 1U; },
+      kOnTheCore);
+  scene.at_end([&] {
+    cycle(kLowBits);
+    cycle(kFirstBit);
+    require((area.bits & 1U) != seen, "a value of the firmware is undone");
+    require(program.first == (area.bits & 1U), "the program and the area have two values");
+    require(program.first == (program.byte & 1U), "places that share bits have two values");
+    observe(seen);
+  });
+  scene.outcomes(1U << 0U | 1U << 1U);
+}
+
+void a_value_within_a_cycle(Scene& scene) {
+  set_up(scene);
+  plchost_take_places(&plchost_tasks[kLow]);
+  assign(97);
+  scene.thread(
+      "high",
+      [] {
+        cycle(kHigh);
+        require(now(area.word) != 97, "a value within a cycle goes out");
+      },
+      kOnTheCore);
+  scene.thread("firmware", [] { write_by_firmware(5); }, kOnTheCore);
+  scene.at_end([] {
+    assign(100);
+    plchost_put_places(&plchost_tasks[kLow]);
+    require(area.word == 100, "the area has not the value that was assigned last");
+  });
+}
+
 }  // namespace
 }  // namespace plchost::models
 
@@ -226,6 +350,11 @@ int main(int argc, char** argv) {
              {{"firmware_writes_in_a_long_cycle", firmware_writes_in_a_long_cycle},
               {"one_resets_what_another_one_sets", one_resets_what_another_one_sets},
               {"bits_of_one_byte", bits_of_one_byte},
+              {"a_bit_beside_its_byte", a_bit_beside_its_byte},
+              {"two_tasks_assign_shared_bits", two_tasks_assign_shared_bits},
+              {"two_tasks_put_shared_bits", two_tasks_put_shared_bits},
+              {"firmware_resets_a_bit", firmware_resets_a_bit},
+              {"a_value_within_a_cycle", a_value_within_a_cycle},
               {"two_tasks_assign", two_tasks_assign},
               {"firmware_writes_and_nobody_assigns", firmware_writes_and_nobody_assigns},
               {"firmware_writes_and_one_assigns", firmware_writes_and_one_assigns}});

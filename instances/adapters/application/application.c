@@ -44,14 +44,30 @@ unsigned long* plchost_ticks(unsigned long long tick_ns) {
   return &own->ticks;
 }
 
+int plchost_is_stopped(unsigned int number) {
+  return __atomic_load_n(&infos[number].tLastCycleTime, __ATOMIC_ACQUIRE) < 0;
+}
+
+int plchost_assign(void* value, const void* now) {
+  const Task_Info* const current = plc_current_task();
+  return current != NULL && plchost_assign_place(&plchost_tasks[current - infos], value, now);
+}
+
+/* Places that share bits with a forced one have its bits. One of them may be forced, too. */
+static void apply_forces(const struct plchost_task* task) {
+  plc_apply_forces();
+  if (plchost_settle_forced_places(task)) plc_apply_forces();
+}
+
 void plchost_begin(unsigned int number) {
   clock_gettime(CLOCK_MONOTONIC, &clocks[number].now);
   plchost_take_places(&plchost_tasks[number]);
-  plc_apply_forces();
+  apply_forces(&plchost_tasks[number]);
 }
 
 void plchost_end(unsigned int number) {
-  plc_apply_forces();
+  plchost_settle_places(&plchost_tasks[number]);
+  apply_forces(&plchost_tasks[number]);
   plchost_put_places(&plchost_tasks[number]);
   plchost_keep_retained(&plchost_tasks[number]);
 }

@@ -5,17 +5,22 @@
  * a value for each task.
  *
  * Outputs: the value is the truth. A task puts its places out at the end of its cycle. With them it puts the
- * other bits of their bytes, as the tasks that use those have put them last. Places that share bits are taken
- * at the begin, and put out if they changed.
+ * other bits of their bytes, as the tasks that use those have put them last.
  *
  * Memory: others write it, too. A place is taken if it differs from the value that was exchanged last, and
  * the program's value does not. It is put out if the program's value does: by a task that has changed it, or
  * by the last one that uses it. So neither a task that interrupts this one nor firmware is undone. If both
- * have changed it in one cycle, the program's value holds.
+ * have changed it in one cycle, the program's value holds. Of places that share bits, this is true of each
+ * bit by itself.
+ *
+ * Outputs and memory whose places share bits: each has a value. Within a task they are one memory, as what
+ * one of them is assigned is passed on to the others, in the order of the statements. What is changed in
+ * another way, by an operator or a reference, is passed on when the values are settled: the narrow ones last.
  */
 #include <stdlib.h>
 #include <string.h>
 
+#include "place_values.h"
 #include "plc_app.h"
 #include "plchost_adapter.h"
 
@@ -39,73 +44,6 @@ static struct area* area_of(const struct plchost_place* place) {
   return &areas[i];
 }
 
-/* Values lie at multiples of their size, places do not. A task that sees what another one has written sees
- * all that this one has done before. */
-static unsigned long long value_at(const void* value, unsigned int bytes) {
-  switch (bytes) {
-    case 1:
-      return __atomic_load_n((const unsigned char*)value, __ATOMIC_ACQUIRE);
-    case 2:
-      return __atomic_load_n((const unsigned short*)value, __ATOMIC_ACQUIRE);
-    case 4:
-      return __atomic_load_n((const unsigned int*)value, __ATOMIC_ACQUIRE);
-    default:
-      return __atomic_load_n((const unsigned long long*)value, __ATOMIC_ACQUIRE);
-  }
-}
-static unsigned long long value_of(const struct plchost_place* place, const void* value) {
-  const unsigned long long now = value_at(value, place->bytes);
-  return place->bit < 0 ? now : now != 0;
-}
-static void set_value(void* value, unsigned int bytes, unsigned long long now) {
-  switch (bytes) {
-    case 1:
-      __atomic_store_n((unsigned char*)value, (unsigned char)now, __ATOMIC_RELEASE);
-      break;
-    case 2:
-      __atomic_store_n((unsigned short*)value, (unsigned short)now, __ATOMIC_RELEASE);
-      break;
-    case 4:
-      __atomic_store_n((unsigned int*)value, (unsigned int)now, __ATOMIC_RELEASE);
-      break;
-    default:
-      __atomic_store_n((unsigned long long*)value, now, __ATOMIC_RELEASE);
-  }
-}
-/* Unless another task has changed it meanwhile: then 0. */
-#define SET_IF(type)                                                                            \
-  {                                                                                             \
-    type expected = (type)before;                                                               \
-    return __atomic_compare_exchange_n((type*)value, &expected, (type)now, 0, __ATOMIC_SEQ_CST, \
-                                       __ATOMIC_SEQ_CST);                                       \
-  }
-static int set_value_if(void* value, unsigned int bytes, unsigned long long before, unsigned long long now) {
-  switch (bytes) {
-    case 1:
-      SET_IF(unsigned char)
-    case 2:
-      SET_IF(unsigned short)
-    case 4:
-      SET_IF(unsigned int)
-    default:
-      SET_IF(unsigned long long)
-  }
-}
-
-/* Others write and read the memory area meanwhile: of such a value they, and this task, see no half. */
-static int is_whole(const struct plchost_place* place, const unsigned char* area) {
-  return (unsigned long)(area + place->offset) % place->bytes == 0;
-}
-
-static unsigned long long load(const struct plchost_place* place, const unsigned char* area) {
-  unsigned long long value = 0;
-  if (is_whole(place, area))
-    value = value_at(area + place->offset, place->bytes);
-  else
-    memcpy(&value, area + place->offset, place->bytes);
-  return place->bit < 0 ? value : (value >> place->bit) & 1u;
-}
-
 /* Several tasks may have bits in one byte of the memory area. */
 static void store(const struct plchost_place* place, unsigned char* area, unsigned long long value) {
   unsigned char* const byte = area + place->offset;
@@ -117,6 +55,25 @@ static void store(const struct plchost_place* place, unsigned char* area, unsign
     __atomic_fetch_or(byte, (unsigned char)(1u << place->bit), __ATOMIC_ACQ_REL);
   } else {
     __atomic_fetch_and(byte, (unsigned char)~(1u << place->bit), __ATOMIC_ACQ_REL);
+  }
+}
+
+/* Of a place that shares bits, others may have those that are not in `bits`. */
+static void store_bits(const struct plchost_place* place, unsigned char* area, unsigned long long value,
+                       unsigned long long bits) {
+  const unsigned int piece = is_whole(place, area) ? place->bytes : 1;
+  unsigned int i;
+  if (place->bit >= 0 || bits == ALL_BITS) {
+    store(place, area, value);
+    return;
+  }
+  for (i = 0; i < place->bytes; i += piece) {
+    unsigned char* const at = area + place->offset + i;
+    const unsigned long long mask = bits >> (8 * i);
+    unsigned long long before;
+    do {
+      before = value_at(at, piece);
+    } while (!set_value_if(at, piece, before, (before & ~mask) | ((value >> (8 * i)) & mask)));
   }
 }
 
@@ -138,8 +95,6 @@ static unsigned long long exchanged(unsigned int number) {
 /* The phases of a task. It takes, and puts, the places one after the other. */
 enum { OUTSIDE = 0, TAKES = 1, IN_CYCLE = 2, PUTS = 4 };
 static unsigned char* phases = NULL; /* of each task */
-static unsigned char* left = NULL;   /* for each place: cycles whose tasks have left it to another one */
-#define MOST_LEFT 200                /* that one may have been stopped in its cycle, by a fault */
 
 static void set_phase(const struct plchost_task* task, unsigned char phase) {
   __atomic_store_n(&phases[task - plchost_tasks], phase, __ATOMIC_SEQ_CST);
@@ -151,6 +106,7 @@ static int another_is_in(int any_of, const struct plchost_task* task, unsigned i
   for (i = 0; i < plchost_task_count; ++i) {
     const struct plchost_task* const other = &plchost_tasks[i];
     if (other == task || (__atomic_load_n(&phases[i], __ATOMIC_SEQ_CST) & any_of) == 0) continue;
+    if (plchost_is_stopped(i)) continue;
     for (j = 0; j < other->uses_count; ++j) {
       if (other->uses[j].place == place) return 1;
     }
@@ -158,57 +114,185 @@ static int another_is_in(int any_of, const struct plchost_task* task, unsigned i
   return 0;
 }
 
-static int leaves(const struct plchost_task* task, unsigned int place, int any_of) {
-  if (!another_is_in(any_of, task, place)) return 0;
-  return __atomic_add_fetch(&left[place], 1, __ATOMIC_RELAXED) <= MOST_LEFT;
+/* ---- Places that share bits: of a task, in a ring ------------------------------------------------------ */
+
+/* A task that comes between may change the place, too: then this one passes on what that one has assigned. */
+static void pass_on(const struct plchost_task* task, const struct plchost_use* use, unsigned long long bits) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  unsigned long long value;
+  do {
+    const struct plchost_use* next = &task->uses[use->next];
+    value = value_of(place, place->value);
+    for (; next != use; next = &task->uses[next->next]) {
+      const struct plchost_place* const other = &plchost_places[next->place];
+      const unsigned long long theirs = bits_in(other, place, bits);
+      unsigned long long before;
+      do {
+        before = value_at(other->value, other->bytes);
+      } while (theirs != 0 &&
+               !set_value_if(other->value, other->bytes, before,
+                             mixed(value_of(other, &before), bits_in(other, place, value), theirs)));
+    }
+  } while (((value_of(place, place->value) ^ value) & bits) != 0);
 }
 
-/* If the program's value is not the one that was exchanged last, a task has assigned it and not put it yet.
- * While another task puts, the value in the area may be older than the program's. The new value counts as
- * exchanged before the program has it: then a task that comes between knows the old one for unchanged. */
+/* Of each task those that share bits, in the order of their values. */
+static struct plchost_use*** sharing = NULL;
+
+static int compare_values(const void* one, const void* other) {
+  const char* const first = (*(struct plchost_use* const*)one)->value;
+  const char* const second = (*(struct plchost_use* const*)other)->value;
+  return (first > second) - (first < second);
+}
+static struct plchost_use* sharing_use(const struct plchost_task* task, void* value) {
+  struct plchost_use key;
+  const struct plchost_use* const wanted = &key;
+  struct plchost_use** found;
+  if (task->sharing_count == 0) return NULL;
+  key.value = value;
+  found = bsearch(&wanted, sharing[task - plchost_tasks], task->sharing_count, sizeof(void*), compare_values);
+  return found == NULL ? NULL : *found;
+}
+
+int plchost_assign_place(const struct plchost_task* task, void* value, const void* now) {
+  const struct plchost_use* const use = sharing_use(task, value);
+  const struct plchost_place* place;
+  unsigned long long assigned = 0;
+  unsigned long long before;
+  if (use == NULL) return 0;
+  place = &plchost_places[use->place];
+  memcpy(&assigned, now, place->bytes);
+  do {
+    before = value_at(value, place->bytes);
+  } while (!set_value_if(value, place->bytes, before, assigned));
+  pass_on(task, use, value_of(place, &before) ^ value_of(place, &assigned));
+  return 1;
+}
+
+static void see_places(const struct plchost_task* task) {
+  unsigned int i;
+  for (i = 0; i < task->sharing_count; ++i)
+    task->uses[i].seen = value_of(&plchost_places[task->uses[i].place], task->uses[i].value);
+}
+
+static int settle(const struct plchost_task* task, int is_forced) {
+  int was_settled = 1;
+  unsigned int i;
+  for (i = 0; i < task->sharing_count; ++i) {
+    const struct plchost_use* const use = &task->uses[i];
+    const struct plchost_place* const place = &plchost_places[use->place];
+    const unsigned long long value = value_of(place, use->value);
+    unsigned long long changed = value ^ use->seen;
+    /* The others take from the area what another task has put there already. */
+    if (place->area == 'M' && !is_forced) changed &= value ^ exchanged(use->place);
+    if (changed == 0) continue;
+    pass_on(task, use, changed);
+    was_settled = 0;
+  }
+  see_places(task);
+  return !was_settled;
+}
+int plchost_settle_places(const struct plchost_task* task) {
+  return settle(task, 0);
+}
+int plchost_settle_forced_places(const struct plchost_task* task) {
+  return settle(task, 1);
+}
+
+/* What is put with one of them is put of all of them, and nobody puts it again: firmware may have changed it.
+ * Before it is in the area, as then no other task takes one of them. */
+static void count_as_put(const struct plchost_task* task, const struct plchost_use* use,
+                         unsigned long long value, unsigned long long bits) {
+  const struct plchost_place* const place = &plchost_places[use->place];
+  unsigned int i = (unsigned int)(use - task->uses);
+  if (i >= task->sharing_count) return;
+  for (i = use->next; &task->uses[i] != use; i = task->uses[i].next) {
+    const unsigned int number = task->uses[i].place;
+    const struct plchost_place* const other = &plchost_places[number];
+    const unsigned long long put = bits_in(other, place, value);
+    unsigned long long theirs;
+    unsigned long long last;
+    do {
+      last = exchanged(number);
+      theirs = bits_in(other, place, bits) & ~(value_of(other, other->value) ^ put);
+    } while (theirs != 0 && !exchange(number, last, mixed(last, put, theirs)));
+  }
+}
+
+/* ---- Memory -------------------------------------------------------------------------------------------- */
+
+/* Bits of the program that are not those that were exchanged last have been assigned by a task and not been
+ * put yet. While another task puts, the area may have older ones than the program. The new ones count as
+ * exchanged before the program has them: then a task that comes between knows the old ones for unchanged. */
 static void take_memory(const struct plchost_task* task, struct plchost_use* use, const unsigned char* area) {
   const struct plchost_place* const place = &plchost_places[use->place];
   const unsigned long long last = exchanged(use->place);
-  const unsigned long long before = value_at(place->value, place->bytes);
+  unsigned long long before = value_at(place->value, place->bytes);
   const unsigned long long now = load(place, area);
-  if (now != last && value_of(place, &before) == last && !leaves(task, use->place, PUTS)) {
+  unsigned long long bits = differ(place, now, last) & ~differ(place, value_of(place, &before), last);
+  if (bits != 0 && !another_is_in(PUTS, task, use->place)) {
     set_phase(task, TAKES);
-    __atomic_store_n(&left[use->place], 0, __ATOMIC_RELAXED);
-    if (exchange(use->place, last, now)) set_value_if(place->value, place->bytes, before, now);
+    if (exchange(use->place, last, mixed(last, now, bits))) {
+      while (bits != 0 &&
+             !set_value_if(place->value, place->bytes, before, mixed(value_of(place, &before), now, bits))) {
+        before = value_at(place->value, place->bytes);
+        bits &= ~differ(place, value_of(place, &before), last);
+      }
+    }
     set_phase(task, IN_CYCLE);
   }
   use->before = value_of(place, place->value);
 }
 
-/* A value that this task has not changed is that of another one, which may be in the midst of its cycle, or
- * of an operator. While another task takes, the program may still have the value of before. If another task
- * puts between the store and the exchange, its value is newer, and the one in the area is replaced again. */
+/* Bits that this task has not changed are those of another one, which may be in the midst of its cycle, or of
+ * an operator. While another task takes, the program may still have those of before. If another task puts
+ * between the store and the exchange, its value is newer, and the one in the area is replaced again. */
 static void put_memory(const struct plchost_task* task, const struct plchost_use* use, unsigned char* area) {
   const struct plchost_place* const place = &plchost_places[use->place];
-  int is_old = 0; /* the value in the area */
+  unsigned long long old = 0; /* bits in the area */
   for (;;) {
     const unsigned long long last = exchanged(use->place);
     const unsigned long long value = value_of(place, place->value);
-    const int others = value == use->before ? TAKES | IN_CYCLE : TAKES;
-    if (!is_old && (value == last || leaves(task, use->place, others))) return;
+    unsigned long long bits = differ(place, value, last);
+    if (bits != 0 && another_is_in(IN_CYCLE, task, use->place)) bits &= differ(place, value, use->before);
+    if (bits != 0 && another_is_in(TAKES, task, use->place)) bits = 0;
+    bits |= old;
+    if (bits == 0) return;
     if (exchanged(use->place) != last || value_of(place, place->value) != value) continue;
-    __atomic_store_n(&left[use->place], 0, __ATOMIC_RELAXED);
-    store(place, area, value);
-    is_old = !exchange(use->place, last, value);
+    count_as_put(task, use, value, bits);
+    store_bits(place, area, value, bits);
+    old = exchange(use->place, last, mixed(last, value, bits)) ? 0 : bits;
   }
 }
 
 /* An online change: this program takes over from one that runs. */
 static int takes_over = 0;
+/* Carried over: 1 in a version whose exchanged values are, too. */
+static unsigned char knows_exchanged = 0;
+static int has_begun = 0;
 
-/* Of another version, whose values this one has: then they are those that were exchanged last. */
-static void find_exchanged(void) {
+static void settle_all(void) {
   unsigned int i;
+  for (i = 0; i < plchost_task_count; ++i) settle(&plchost_tasks[i], 1);
+}
+
+/* Before the first cycle. A place that only this version has was exchanged with nobody: an initial value that
+ * is not 0 goes out, else it takes that of the area. Bits that are set in it are set in those that share
+ * them. */
+static void begin_all(void) {
+  unsigned int i;
+  unsigned int j;
+  for (i = 0; i < plchost_place_count && takes_over && !knows_exchanged; ++i)
+    plchost_exchanged[i] = value_of(&plchost_places[i], plchost_places[i].value);
+  for (i = 0; i < plchost_task_count && takes_over; ++i) {
+    for (j = 0; j < plchost_tasks[i].sharing_count; ++j) plchost_tasks[i].uses[j].seen = 0;
+  }
+  if (takes_over) settle_all();
   for (i = 0; i < plchost_place_count; ++i) {
     const struct plchost_place* const place = &plchost_places[i];
-    if (place->area == 'Q' || (place->area == 'M' && takes_over))
-      plchost_exchanged[i] = value_of(place, place->value);
+    if (place->area == 'Q') plchost_exchanged[i] = value_of(place, place->value);
   }
+  knows_exchanged = 1;
 }
 
 static void put_output(const struct plchost_use* use, unsigned char* area) {
@@ -217,33 +301,33 @@ static void put_output(const struct plchost_use* use, unsigned char* area) {
   const unsigned long long value = value_of(place, use->value);
   if (use->others) {
     store(place, area, __atomic_load_n(exchanged, __ATOMIC_SEQ_CST));
-  } else if (!place->aliased || value != use->before) {
+  } else {
     __atomic_store_n(exchanged, value, __ATOMIC_SEQ_CST);
     store(place, area, value);
   }
 }
 
 void plchost_take_places(const struct plchost_task* task) {
-  static int is_known = 0;
   unsigned char* found[AREAS];
   unsigned int i;
-  if (!__atomic_load_n(&is_known, __ATOMIC_SEQ_CST)) {
-    find_exchanged();
-    __atomic_store_n(&is_known, 1, __ATOMIC_SEQ_CST);
+  if (!__atomic_load_n(&has_begun, __ATOMIC_SEQ_CST)) {
+    begin_all();
+    __atomic_store_n(&has_begun, 1, __ATOMIC_SEQ_CST);
   }
   set_phase(task, IN_CYCLE);
   find_areas(found);
+  plchost_settle_places(task);
   for (i = 0; i < task->uses_count; ++i) {
     struct plchost_use* const use = &task->uses[i];
     const struct plchost_place* const place = &plchost_places[use->place];
     const unsigned char* const area = found[area_of(place) - areas];
     if (place->area == 'M') {
       take_memory(task, use, area);
-    } else if (place->area == 'I' || place->aliased) {
-      use->before = load(place, area);
-      set_value(use->value, place->bytes, use->before);
+    } else if (place->area == 'I') {
+      set_value(use->value, place->bytes, load(place, area));
     }
   }
+  see_places(task);
 }
 
 void plchost_put_places(const struct plchost_task* task) {
@@ -251,6 +335,7 @@ void plchost_put_places(const struct plchost_task* task) {
   unsigned int i;
   set_phase(task, PUTS);
   find_areas(found);
+  see_places(task);
   for (i = 0; i < task->uses_count; ++i) {
     const struct plchost_use* const use = &task->uses[i];
     const struct plchost_place* const place = &plchost_places[use->place];
@@ -262,33 +347,6 @@ void plchost_put_places(const struct plchost_task* task) {
     }
   }
   set_phase(task, OUTSIDE);
-}
-
-void plchost_exchange_places(const struct plchost_task* task) {
-  unsigned char* found[AREAS];
-  unsigned int step;
-  unsigned int i;
-  find_areas(found);
-  for (step = 0; step < 2; ++step) { /* all of them are put before any is taken */
-    set_phase(task, step == 0 ? PUTS : IN_CYCLE);
-    for (i = 0; i < task->uses_count; ++i) {
-      struct plchost_use* const use = &task->uses[i];
-      const struct plchost_place* const place = &plchost_places[use->place];
-      unsigned char* const area = found[area_of(place) - areas];
-      if (!place->aliased || place->area == 'I') continue;
-      if (place->area == 'M') {
-        if (step == 0)
-          put_memory(task, use, area);
-        else
-          take_memory(task, use, area);
-      } else if (step == 0) {
-        put_output(use, area);
-      } else {
-        use->before = load(place, area);
-        set_value(use->value, place->bytes, use->before);
-      }
-    }
-  }
 }
 
 unsigned char plchost_bit_now(unsigned int number) {
@@ -325,6 +383,25 @@ static void preset(const struct area* area) {
 static unsigned char* initial_bytes = NULL;
 static Plc_Area_Use* area_users = NULL;
 
+static int sort_sharing(void) {
+  unsigned int i;
+  unsigned int j;
+  unsigned int count = 0;
+  struct plchost_use** all;
+  for (i = 0; i < plchost_task_count; ++i) count += plchost_tasks[i].sharing_count;
+  sharing = malloc((plchost_task_count + count) * sizeof(void*) + 1);
+  if (sharing == NULL) return 0;
+  all = (struct plchost_use**)(sharing + plchost_task_count);
+  for (i = 0; i < plchost_task_count; ++i) {
+    const struct plchost_task* const task = &plchost_tasks[i];
+    for (j = 0; j < task->sharing_count; ++j) all[j] = &task->uses[j];
+    qsort(all, task->sharing_count, sizeof *all, compare_values);
+    sharing[i] = all;
+    all += task->sharing_count;
+  }
+  return 1;
+}
+
 static int allocate_areas(void) {
   unsigned int i;
   unsigned int bytes = 0;
@@ -336,8 +413,7 @@ static int allocate_areas(void) {
   }
   for (i = 0; i < AREAS; ++i) bytes += areas[i].bytes;
   phases = calloc(plchost_task_count + 1u, 1);
-  left = calloc(plchost_place_count + 1u, 1);
-  if (phases == NULL || left == NULL) return 0;
+  if (phases == NULL || !sort_sharing()) return 0;
   if (bytes == 0) return 1;
   initial_bytes = calloc(bytes, 1);
   area_users = calloc(AREAS * plchost_task_count, sizeof *area_users);
@@ -371,14 +447,25 @@ static int declare(struct area* area) {
   return area->handle != RTS_INVALID_HANDLE;
 }
 
+static int keep_exchanged(unsigned int number) {
+  char name[PLC_MAX_VARIABLE_NAME + 1] = "area-";
+  strncat(name, plchost_places[number].name, sizeof name - sizeof "area-");
+  return plc_keep_variables(name, &plchost_exchanged[number], sizeof plchost_exchanged[number], 0) == ERR_OK;
+}
+
 int plchost_declare_places(void) {
   unsigned int i;
   takes_over = plc_online_change();
+  has_begun = 0;
+  knows_exchanged = 0;
+  settle_all();
+  if (plc_keep_variables("exchanged", &knows_exchanged, sizeof knows_exchanged, 0) != ERR_OK) return 0;
   for (i = 0; i < plchost_place_count; ++i) {
     const struct plchost_place* const place = &plchost_places[i];
-    plchost_exchanged[i] = value_of(place, place->value);
+    plchost_exchanged[i] = takes_over && place->area == 'M' ? 0 : value_of(place, place->value);
     /* An output is what the program has; an edge is one of a value of before. */
     if (plc_keep_variables(place->name, place->value, place->bytes, 0) != ERR_OK) return 0;
+    if (place->area == 'M' && !keep_exchanged(i)) return 0;
   }
   for (i = 0; i < plchost_location_count; ++i) {
     const struct plchost_location* const location = &plchost_locations[i];
@@ -395,5 +482,5 @@ void plchost_forget_places(void) {
   free(initial_bytes);
   free(area_users);
   free(phases);
-  free(left);
+  free(sharing);
 }

@@ -34,9 +34,11 @@ struct plchost_location {
 /* A place that a task exchanges with its area. */
 struct plchost_use {
   unsigned int place;
-  void* value;          /* that of the place, or one of this task alone */
-  unsigned char others; /* 1: only other tasks use it. It has bits in a byte that this one puts out */
-  unsigned long long before;
+  void* value;               /* that of the place, or one of this task alone */
+  unsigned char others;      /* 1: only other tasks use it. It has bits in a byte that this one puts out */
+  unsigned int next;         /* of those that share bits: the next one in their ring */
+  unsigned long long before; /* the value at the begin of the cycle */
+  unsigned long long seen;   /* that when all of the ring were one memory last */
 };
 
 /* Options that IEC 61131-3 does not have; the ranges are those of Task_Options in plc_app.h. */
@@ -62,6 +64,7 @@ struct plchost_task {
   const unsigned int* retained;          /* numbers among the retained variables */
   const char* external_event;            /* each post runs it; null: none does */
   const struct plchost_options* options; /* null: the defaults */
+  unsigned int sharing_count; /* so many of the first uses share bits. The widest one comes first */
 };
 
 /* A variable that is not located. */
@@ -127,6 +130,11 @@ void plchost_bind(void); /* makes the program ready for its first cycle */
 /* From application.c: around each cycle of a task. */
 void plchost_begin(unsigned int task);
 void plchost_end(unsigned int task);
+/* 1: a fault or a watchdog has stopped it within its cycle. Any thread. */
+int plchost_is_stopped(unsigned int task);
+/* An assignment by the task that runs on this thread: `now` has the bytes of the value. 0: it is of no place
+ * that shares bits with others of the task, and nothing is done. */
+int plchost_assign(void* value, const void* now);
 
 /* From copies.c: around the code of a program. Preparing returns 0 if it fails. */
 int plchost_prepare_copies(void);
@@ -139,9 +147,12 @@ int plchost_declare_places(void);
 void plchost_forget_places(void);
 void plchost_take_places(const struct plchost_task* task);
 void plchost_put_places(const struct plchost_task* task);
-/* Between two programs of a task: the second one has the places that the first one has changed by another
- * name. */
-void plchost_exchange_places(const struct plchost_task* task);
+/* Places that share bits are one memory again, after something else than an assignment has changed some of
+ * them. 1: some were not. */
+int plchost_settle_places(const struct plchost_task* task);
+int plchost_settle_forced_places(const struct plchost_task* task);
+/* As plchost_assign(). */
+int plchost_assign_place(const struct plchost_task* task, void* value, const void* now);
 /* The bit of a place in the memory area as it is now. Any thread. */
 unsigned char plchost_bit_now(unsigned int place);
 

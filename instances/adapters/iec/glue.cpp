@@ -35,16 +35,18 @@ GlueWriter::GlueWriter(const Project& project, const Configuration& configuratio
 }
 
 Glue GlueWriter::write() {
+  find_places();
+  find_aliases();
+  find_rings();
   write_head();
   print("const char plchost_application_name[] = \"{}\";\nconst char plchost_scheduler[] = \"{}\";\n",
         configuration_.name, resource_.scheduler);
-  find_places();
-  find_aliases();
   write_storage();
   write_copies();
   write_places();
   write_locations();
   refuse_shared_bits();
+  name_shared_memory();
   for (std::size_t i = 0; i < plan_.tasks.size(); ++i) write_task(plan_.tasks[i], i);
   write_tasks();
   write_programs();
@@ -149,6 +151,41 @@ void GlueWriter::find_aliases() {
   }
 }
 
+// Within a task, two of a group may share no bits, as only another task uses the place that has both.
+void GlueWriter::find_rings() {
+  const auto width = [&](std::size_t number) {
+    return end_bit(places_[number].place) - first_bit(places_[number].place);
+  };
+  rings_.resize(plan_.tasks.size());
+  for (std::size_t task = 0; task < rings_.size(); ++task) {
+    for (const auto& group : groups_) {
+      std::vector<std::size_t> used;
+      std::ranges::copy_if(group, std::back_inserter(used), [&](std::size_t number) {
+        return places_[number].place.area != 'I' && places_[number].tasks.contains(task);
+      });
+      // The widest one of those that share bits has all others in it.
+      std::ranges::stable_sort(used, std::ranges::greater(), width);
+      while (!used.empty()) {
+        const Place widest = places_[used.front()].place;
+        const auto rest = std::ranges::stable_partition(used, [&](std::size_t number) {
+          const Place& place = places_[number].place;
+          return first_bit(place) >= first_bit(widest) && end_bit(place) <= end_bit(widest);
+        });
+        const std::vector<std::size_t> ring(used.begin(), rest.begin());
+        for (std::size_t i = 0; i < ring.size() && ring.size() > 1; ++i)
+          rings_[task].emplace_back(ring[i], ring[(i + 1) % ring.size()]);
+        used.erase(used.begin(), rest.begin());
+      }
+    }
+    std::ranges::stable_sort(rings_[task], std::ranges::greater(),
+                             [&](const auto& entry) { return width(entry.first); });
+  }
+}
+
+bool GlueWriter::has_shared_bits() const {
+  return std::ranges::any_of(rings_, [](const auto& ring) { return !ring.empty(); });
+}
+
 // A task has its own copy of the outputs, so one of the two would undo what the other one wrote.
 void GlueWriter::refuse_shared_bits() {
   for (const auto& group : groups_) {
@@ -166,6 +203,26 @@ void GlueWriter::refuse_shared_bits() {
   }
 }
 
+// Of one place, name_shared_places() of the plan does.
+void GlueWriter::name_shared_memory() {
+  for (const auto& group : groups_) {
+    const Known& first = places_[group.front()];
+    std::set<std::size_t> tasks;
+    for (const std::size_t number : group)
+      tasks.insert(places_[number].tasks.begin(), places_[number].tasks.end());
+    const auto other =
+        std::ranges::find_if(group, [&](std::size_t number) { return places_[number].place != first.place; });
+    if (first.place.area != 'M' || tasks.size() < 2 || other == group.end()) continue;
+    std::vector<std::string_view> names;
+    for (const std::size_t task : tasks) names.emplace_back(plan_.tasks[task].name);
+    plan_.remarks.push_back(
+        {plan_.located.at(places_[*other].place).front()->place,
+         fmt::format("{} and {} share bits, and the tasks {} use them: a task has what another one assigns "
+                     "there from its next cycle on",
+                     places_[*other].location, first.location, fmt::join(names, ", "))});
+  }
+}
+
 void GlueWriter::write_task(const PlannedTask& task, std::size_t number) {
   const std::size_t uses = write_uses(number);
   print("static const unsigned int plchost_retained_{}[] = {{{}}};\n", number, list_of(retained_by(number)));
@@ -173,20 +230,13 @@ void GlueWriter::write_task(const PlannedTask& task, std::size_t number) {
   const bool shares = shares_bits(number);
   for (const Program* const program : task.programs) {
     if (shares && program != task.programs.front())
-      print("  plchost_exchange_places(&plchost_tasks[{}]);\n", number);
+      print("  plchost_settle_places(&plchost_tasks[{}]);\n", number);
     write_call(*program);
   }
   print("  plchost_end({});\n}}\n", number);
   if (!task.single.empty()) write_edge(task, number);
   if (task.extension.options) write_options(*task.extension.options, number);
   use_counts_.push_back(uses);
-}
-
-// Not inputs: no program changes them for the others.
-bool GlueWriter::shares_bits(std::size_t task) const {
-  return std::ranges::any_of(places_, [&](const Known& known) {
-    return known.aliased && known.place.area != 'I' && known.tasks.contains(task);
-  });
 }
 
 void GlueWriter::write_edge(const PlannedTask& task, std::size_t number) {
@@ -201,18 +251,26 @@ void GlueWriter::write_edge(const PlannedTask& task, std::size_t number) {
   }
 }
 
-// The number of them.
+// The number of them. Those that share bits come first.
 std::size_t GlueWriter::write_uses(std::size_t number) {
+  const auto& ring = rings_[number];
   std::string uses;
   std::size_t count = 0;
-  const auto add = [&](std::size_t place, const std::string& value) {
+  const auto write = [&](std::size_t place, const std::string& value, std::size_t next) {
     const bool is_of_others = !places_[place].tasks.contains(number);
-    uses += fmt::format("  {{{}, &{}, {}, 0}},\n", place, value, is_of_others ? 1 : 0);
+    uses += fmt::format("  {{{}, &{}, {}, {}}},\n", place, value, is_of_others ? 1 : 0, next);
     ++count;
   };
-  const std::set<Place> own = write_own_inputs(number, add);
+  const auto in_ring = [&](std::size_t place) {
+    return std::ranges::find(ring, place, [](const auto& entry) { return entry.first; });
+  };
+  for (const auto& [place, next] : ring)
+    write(place, places_[place].value, static_cast<std::size_t>(in_ring(next) - ring.begin()));
+  const std::set<Place> own =
+      write_own_inputs(number, [&](std::size_t place, const std::string& value) { write(place, value, 0); });
   for (const std::size_t place : exchanged_by(number)) {
-    if (!own.contains(places_[place].place)) add(place, places_[place].value);
+    if (in_ring(place) == ring.end() && !own.contains(places_[place].place))
+      write(place, places_[place].value, 0);
   }
   print("static struct plchost_use plchost_uses_{}[] = {{\n{}  {{0}}}};\n", number, uses);
   return count;
@@ -267,11 +325,11 @@ void GlueWriter::write_tasks() {
     const std::string& event = task.extension.external_event;
     print(
         "  {{\"{0}\", {1}, {2}L, {3}, plchost_run_{4}, {5}, plchost_uses_{4}, {6}, "
-        "plchost_retained_{4}, {7}, {8}}},\n",
+        "plchost_retained_{4}, {7}, {8}, {9}}},\n",
         task.name, task.priority, task.interval_ns,
         task.single.empty() ? "0" : fmt::format("plchost_edge_{}", i), i, use_counts_[i],
         variables_.retained[i].size(), event.empty() ? "0" : fmt::format("\"{}\"", event),
-        task.extension.options ? fmt::format("&plchost_options_{}", i) : "0");
+        task.extension.options ? fmt::format("&plchost_options_{}", i) : "0", rings_[i].size());
   }
   print("}};\n");
 }

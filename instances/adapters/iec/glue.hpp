@@ -51,7 +51,7 @@ class GlueWriter {
     bool aliased = false;           ///< another one has some of its bits
   };
 
-  /// Includes, and what the compiler's output needs.
+  /// Includes, and what the compiler's output needs. After find_places().
   virtual void write_head() = 0;
   /// Fills places().
   virtual void find_places() = 0;
@@ -94,6 +94,8 @@ class GlueWriter {
   [[nodiscard]] TaskPlan& plan() noexcept { return plan_; }
   [[nodiscard]] const TaskPlan& plan() const noexcept { return plan_; }
   [[nodiscard]] std::vector<Known>& places() noexcept { return places_; }
+  /// Places that share bits, and are one memory within a task, by plchost_assign().
+  [[nodiscard]] bool has_shared_bits() const;
   /// Of a global that is located; else one of no area.
   [[nodiscard]] Place place_or_none(const Variable& variable) const;
 
@@ -105,7 +107,9 @@ class GlueWriter {
   void write_locations();
   void find_aliases();
   void refuse_shared_bits();
-  [[nodiscard]] bool shares_bits(std::size_t task) const;
+  [[nodiscard]] bool shares_bits(std::size_t task) const { return !rings_[task].empty(); }
+  void find_rings();
+  void name_shared_memory();
   void write_task(const PlannedTask& task, std::size_t number);
   void write_edge(const PlannedTask& task, std::size_t number);
   std::size_t write_uses(std::size_t number);
@@ -132,6 +136,9 @@ class GlueWriter {
   std::map<const Program*, CopyRange> copies_of_programs_;
   std::vector<Known> places_;
   std::vector<std::vector<std::size_t>> groups_;  // of places that share bits
+  // For each task the outputs and the memory that share bits within it, the widest places first. Each has the
+  // next one of those that share its bits, a ring.
+  std::vector<std::vector<std::pair<std::size_t, std::size_t>>> rings_;
   std::vector<std::size_t> use_counts_;
   std::vector<std::size_t> retained_number_;  // for each variable, if it is retained
   std::string text_;

@@ -32,8 +32,9 @@ class Writer : public iec::GlueWriter {
 
  private:
   void write_head() override {
-    print("/* Written by plcctl build application. */\n#include \"plchost_adapter.h\"\n#include \"{}.c\"\n\n",
-          resource().name.empty() ? "RESOURCE" : resource().name);
+    print("/* Written by plcctl build application. */\n#include \"plchost_adapter.h\"\n");
+    if (has_shared_bits()) print("#include \"plchost_assigned.h\"\n");
+    print("#include \"{}.c\"\n\n", resource().name.empty() ? "RESOURCE" : resource().name);
     print("BOOL __DEBUG;\nvoid config_init__(void);\n");
     // The file of the resource has a macro for each instance.
     for (const iec::Program& program : resource().programs) print("#undef {}\n", folded(program.name));
@@ -48,7 +49,7 @@ class Writer : public iec::GlueWriter {
     }
   }
 
-  // Of the same name once: several programs may have it.
+  // iec2c writes one for each declaration, and several may have one address.
   void find_places() override {
     for (const Located& pointer : located_) {
       const auto place = plan().locations.place(pointer.location);
@@ -67,7 +68,8 @@ class Writer : public iec::GlueWriter {
                             .place = *place});
         pointers_.emplace_back();
       }
-      pointers_[number->second].push_back(&pointer);
+      auto& known = pointers_[number->second];
+      if (std::ranges::find(known, pointer.name, &Located::name) == known.end()) known.push_back(&pointer);
     }
     for (std::size_t i = 0; i < plan().tasks.size(); ++i) {
       for (const Place& place : plan().tasks[i].places) {

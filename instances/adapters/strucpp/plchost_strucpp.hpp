@@ -44,11 +44,51 @@ class plchost_mutex {
 };
 }  // namespace std
 #define mutex plchost_mutex
+#define GlobalVar plchost_global
 #include "iec_global.hpp"
+#undef GlobalVar
 #undef mutex
 #include "iec_array.hpp"
 #include "iec_enum.hpp"
 #include "iec_std_lib.hpp"
+
+// An assignment to a located variable, or to a global. Other variables may share its bits.
+template <class T>
+class plchost_assigned {
+ public:
+  explicit plchost_assigned(strucpp::IECVar<T>& variable) noexcept : variable_(variable) {}
+  template <class Value>
+  void operator=(Value&& value) noexcept {
+    strucpp::IECVar<T> next;
+    next = std::forward<Value>(value);
+    const T now = next.get();
+    if (!std::is_arithmetic_v<T> || !plchost_assign(variable_.raw_ptr(), &now)) variable_.set(now);
+  }
+
+ private:
+  strucpp::IECVar<T>& variable_;
+};
+template <class T>
+plchost_assigned<T> plchost_to(strucpp::IECVar<T>& variable) noexcept {
+  return plchost_assigned<T>(variable);
+}
+template <class Variable>
+Variable& plchost_to(Variable& variable) noexcept;  // not evaluated
+namespace strucpp {
+template <class V>
+class GlobalVar : public plchost_global<V> {
+ public:
+  using plchost_global<V>::plchost_global;
+  template <class T>
+  void write(T now) {
+    if constexpr (std::is_same_v<decltype(plchost_to(this->value)), V&>) {
+      plchost_global<V>::write(now);
+    } else {
+      this->with_lock([&](V* value) { plchost_to(*value) = now; });
+    }
+  }
+};
+}  // namespace strucpp
 
 // The library's clock is a variable of each thread, which takes memory at its first use. This one is that of
 // the begin of the task's cycle.

@@ -526,6 +526,16 @@ class Enumerations {
   }
 }
 
+// Located variables of a program may share bits with others: plchost_to() assigns one, and knows them.
+function withAssigned(code, pous) {
+  return code.replace(/^void Program_(\w+)::run\(\) \{\n[\s\S]*?^\}/gm, (body, program) => {
+    const variables = pous.find((pou) => pou.kind === 'program' && pou.name.toUpperCase() === program)?.variables ?? [];
+    const names = variables.filter((one) => /^%[QM]/i.test(one.location) && one.member !== '').map((one) => one.member);
+    if (names.length === 0) return body;
+    return body.replace(new RegExp(`"(?:\\\\.|[^"\\\\\n])*"|(?<![\\w.>])(${names.join('|')})(?= = )`, 'g'), (all, name) => (name === undefined ? all : `plchost_to(${name})`));
+  });
+}
+
 class Plan {
   constructor(result) {
     this.ast = result.ast;
@@ -1079,7 +1089,7 @@ if (result.success) {
   const warnings = result.warnings.filter((warning) => !warning.message.includes('has no task assignment'));
   plan.remarks = bounded([...warnings.map(message), ...found.remarks]);
   for (const file of result.cppFiles) {
-    writeFileSync(file.name, enumerations.withDefaults(file.content), { flag: 'wx' });
+    writeFileSync(file.name, withAssigned(enumerations.withDefaults(file.content), plan.pous), { flag: 'wx' });
     plan.files.push(file.name);
   }
   writeFileSync('generated.hpp', enumerations.withDefaults(result.headerCode), { flag: 'wx' });

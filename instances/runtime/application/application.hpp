@@ -48,7 +48,7 @@ class Application {
   [[nodiscard]] const std::vector<TaskConfig>& tasks() const noexcept { return tasks_; }
   /// For those that put something around the cycles. Before the tasks are made.
   [[nodiscard]] std::span<TaskConfig> tasks_to_change() noexcept { return tasks_; }
-  [[nodiscard]] const Task_Info& info(std::size_t index) const noexcept { return *codes_[index]->info; }
+  [[nodiscard]] Task_Info& info(std::size_t index) const noexcept { return *codes_[index]->info; }
 
  private:
   Application(SharedObject object, std::string build, const sys_setup_tasks_struct& setup,

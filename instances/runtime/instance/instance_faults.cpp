@@ -1,6 +1,7 @@
 // The actions of an Instance when one of its tasks has a fault.
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <span>
 #include <string>
@@ -96,6 +97,8 @@ void Instance::serve_faults() {
       enter_exception(reason_of(kept.back().second));
     } else {
       unbind(fault->task);  // nobody runs what is posted to it any more
+      // Other tasks wait for the end of its cycle with what belongs to both.
+      std::atomic_ref(application_->info(fault->task).tLastCycleTime).store(-1, std::memory_order_release);
     }
   }
   name_faults(kept);

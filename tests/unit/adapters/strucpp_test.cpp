@@ -167,7 +167,7 @@ TEST(StrucppGlue, HasTheTasksOfATaskFile) {
       glue_of({}, "[task.REST]\nexternal_event='product'\n[task.fast]\nwatchdog_time='5ms'\n");
   EXPECT_THAT(glue.text,
               HasSubstr("{\"rest\", 31, 0L, 0, plchost_run_2, 0, plchost_uses_2, 0, plchost_retained_2, "
-                        "\"product\", 0},"));
+                        "\"product\", 0, 0},"));
   EXPECT_THAT(glue.text, HasSubstr("plchost_options_0 = {0L, 0, 0, 5000u, 1u, 0u, 0};"));
 }
 

@@ -24,12 +24,13 @@ unsigned long long plchost_exchanged[11];
 const unsigned int plchost_location_count = 0;
 const struct plchost_location plchost_locations[] = {{0, 0}};
 
-static struct plchost_use of_fast[] = {{0, &go, 0, 0},   {1, &raw, 0, 0},   {2, &lamp, 0, 0},
-                                       {3, &byte, 0, 0}, {4, &twice, 0, 0}, {6, &copy, 0, 0},
-                                       {7, &flag, 0, 0}, {9, &preset, 0, 0}};
-static struct plchost_use of_edge[] = {{5, &edges, 0, 0}};
-static struct plchost_use of_loop[] = {{7, &flag, 0, 0}, {8, &loops, 0, 0}};
-static struct plchost_use of_posted[] = {{10, &posts, 0, 0}};
+/* The first two share a bit. */
+static struct plchost_use of_fast[] = {
+    {3, &byte, 0, 1, 0, 0},  {2, &lamp, 0, 0, 0, 0}, {0, &go, 0, 0, 0, 0},   {1, &raw, 0, 0, 0, 0},
+    {4, &twice, 0, 0, 0, 0}, {6, &copy, 0, 0, 0, 0}, {7, &flag, 0, 0, 0, 0}, {9, &preset, 0, 0, 0, 0}};
+static struct plchost_use of_edge[] = {{5, &edges, 0, 0, 0, 0}};
+static struct plchost_use of_loop[] = {{7, &flag, 0, 0, 0, 0}, {8, &loops, 0, 0, 0, 0}};
+static struct plchost_use of_posted[] = {{10, &posts, 0, 0, 0, 0}};
 
 static void run_fast(void) {
   plchost_begin(0);
@@ -71,11 +72,11 @@ const unsigned int plchost_program_count = 1;
 const struct plchost_program plchost_programs[] = {{"cell1", "Cell", "fast"}};
 const unsigned int plchost_task_count = 5;
 const struct plchost_task plchost_tasks[] = {
-    {"fast", 1, 2000000L, 0, run_fast, 8, of_fast, 0, 0, 0, &of_fast_task},
-    {"edge", 0, 0, edge, run_edge, 1, of_edge, 0, 0, 0, 0},
-    {"loop", 31, 0, 0, run_loop, 2, of_loop, 0, 0, 0, 0},
-    {"posted", 2, 0, 0, run_posted, 1, of_posted, 0, 0, "product", 0},
-    {"guarded", 3, 0, 0, run_guarded, 0, 0, 0, 0, "product", &of_guarded_task}};
+    {"fast", 1, 2000000L, 0, run_fast, 8, of_fast, 0, 0, 0, &of_fast_task, 2},
+    {"edge", 0, 0, edge, run_edge, 1, of_edge, 0, 0, 0, 0, 0},
+    {"loop", 31, 0, 0, run_loop, 2, of_loop, 0, 0, 0, 0, 0},
+    {"posted", 2, 0, 0, run_posted, 1, of_posted, 0, 0, "product", 0, 0},
+    {"guarded", 3, 0, 0, run_guarded, 0, 0, 0, 0, "product", &of_guarded_task, 0}};
 
 void plchost_each_variable(void (*use)(const struct plchost_variable*)) {
   (void)use;

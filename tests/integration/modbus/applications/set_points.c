@@ -31,10 +31,11 @@ const unsigned int plchost_location_count = 0;
 const struct plchost_location plchost_locations[] = {{0, 0}};
 
 static struct plchost_use of_fast[] = {
-    {0, &set_point, 0, 0}, {1, &count, 0, 0}, {2, &echo, 0, 0}, {3, &lost, 0, 0}, {4, &toggles, 0, 0},
-    {5, &wanted, 0, 0},    {6, &lamp, 0, 0},  {7, &torn, 0, 0}, {8, &wide, 0, 0}, {9, &assigned, 0, 0}};
-static struct plchost_use of_slow[] = {{9, &assigned, 0, 0}, {10, &gone, 0, 0}};
-static struct plchost_use of_rare[] = {{11, &rare_point, 0, 0}, {12, &rare_echo, 0, 0}};
+    {0, &set_point, 0, 0, 0, 0}, {1, &count, 0, 0, 0, 0},   {2, &echo, 0, 0, 0, 0}, {3, &lost, 0, 0, 0, 0},
+    {4, &toggles, 0, 0, 0, 0},   {5, &wanted, 0, 0, 0, 0},  {6, &lamp, 0, 0, 0, 0}, {7, &torn, 0, 0, 0, 0},
+    {8, &wide, 0, 0, 0, 0},      {9, &assigned, 0, 0, 0, 0}};
+static struct plchost_use of_slow[] = {{9, &assigned, 0, 0, 0, 0}, {10, &gone, 0, 0, 0, 0}};
+static struct plchost_use of_rare[] = {{11, &rare_point, 0, 0, 0, 0}, {12, &rare_echo, 0, 0, 0, 0}};
 static unsigned int cycles;
 
 static void run_fast(void) {
@@ -72,9 +73,10 @@ static void run_rare(void) {
 const unsigned int plchost_program_count = 1;
 const struct plchost_program plchost_programs[] = {{"cell1", "Cell", "fast"}};
 const unsigned int plchost_task_count = 3;
-const struct plchost_task plchost_tasks[] = {{"fast", 1, 1000000L, 0, run_fast, 10, of_fast, 0, 0, 0, 0},
-                                             {"slow", 31, 0, 0, run_slow, 2, of_slow, 0, 0, 0, 0},
-                                             {"rare", 2, 1000000000L, 0, run_rare, 2, of_rare, 0, 0, 0, 0}};
+const struct plchost_task plchost_tasks[] = {
+    {"fast", 1, 1000000L, 0, run_fast, 10, of_fast, 0, 0, 0, 0, 0},
+    {"slow", 31, 0, 0, run_slow, 2, of_slow, 0, 0, 0, 0, 0},
+    {"rare", 2, 1000000000L, 0, run_rare, 2, of_rare, 0, 0, 0, 0, 0}};
 
 void plchost_each_variable(void (*use)(const struct plchost_variable*)) {
   (void)use;
