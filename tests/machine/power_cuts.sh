@@ -84,7 +84,7 @@ looks_after_cut() {
   problems=$(on_machine journalctl -q --no-pager -b -u plchostd | grep -E 'checksum|damaged|corrupt' || true)
   [ -z "$problems" ] || fail "a file was damaged: $problems"
   on_machine plcctl verify audit /var/lib/plchost/audit.plchost >"$log" 2>&1 || fail "the log of changes is not whole"
-  [ "$(last came 2.5)" -lt 1 ] || on_machine grep -rqF "line1/cut$(last came 2.5)" /var/lib/plchost/audit.plchost ||
+  [ "$(last came 2.5)" -lt 1 ] || on_machine grep -rqF "\"argument\":\"cut$(last came 2.5)\"" /var/lib/plchost/audit.plchost ||
     fail "the registration of cut$(last came 2.5) is not in the log of changes"
 }
 
