@@ -77,6 +77,8 @@ class ClientCore {
                                                 TimePoint deadline);
   Async<Result<DebugPart>> read_debug(std::string host, std::string instance, DebugQuery query,
                                       TimePoint deadline);
+  Async<Result<TraceListing>> read_trace(std::string host, std::string instance, TraceQuery query,
+                                         TimePoint deadline);
   Async<Result<std::vector<plc_HostFinding>>> check_host(std::string host, TimePoint deadline);
   Async<Result<bool>> has_all_transitions(std::string host, TimePoint deadline);
 
@@ -207,7 +209,7 @@ class ClientCore {
   dds::TopicReader replies_;
   Inbox<ApiReply> replied_;
   std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>, Pages<plc_VariablePage>,
-             Pages<plc_DebugPage>>
+             Pages<plc_DebugPage>, Pages<plc_TracePage>>
       pages_;
   dds::TopicReader acks_;
   dds::TopicReader runs_;

@@ -108,4 +108,10 @@ Async<Result<DebugPart>> ClientCore::read_debug(std::string host, std::string in
       to_instance(std::move(host), std::move(instance), plc_OPERATION_READ_DEBUG, part_of(query)), deadline);
 }
 
+Async<Result<TraceListing>> ClientCore::read_trace(std::string host, std::string instance, TraceQuery query,
+                                                   TimePoint deadline) {
+  return ask_for_page<plc_TracePage>(
+      to_instance(std::move(host), std::move(instance), plc_OPERATION_READ_TRACE, part_of(query)), deadline);
+}
+
 }  // namespace plchost

@@ -15,6 +15,7 @@
 #include "api/dds/log_page.hpp"
 #include "api/dds/node_page.hpp"
 #include "api/dds/object_page.hpp"
+#include "api/dds/trace_page.hpp"
 #include "api/dds/variable_page.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"

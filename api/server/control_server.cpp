@@ -328,6 +328,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   if (checked->verb == ControlVerb::read_log) return read_log(client, request);
   if (checked->verb == ControlVerb::list_variables) return list_variables(client, request);
   if (checked->verb == ControlVerb::read_debug) return read_debug(client, request);
+  if (checked->verb == ControlVerb::read_trace) return read_trace(client, request);
   audit->handed_on(identity);
   if (!operation_of(checked->verb).only_reads) checked->id = request_id(identity);
   if (checked->verb == ControlVerb::download_application) {

@@ -12,6 +12,7 @@
 #include "api/dds/object_page.hpp"
 #include "api/dds/object_query.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/trace_page.hpp"
 #include "api/dds/variable_page.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/pages/debug_page.hpp"
@@ -88,6 +89,16 @@ void ControlServer::Parts::read_debug(const dds::Guid& client, const plc_Request
       read_debug_part(pool.name(), dds::text_of(request.instance), debug_query_of(request.part));
   if (!part) return tell(client, identity, part.error().code, part.error().describe());
   DebugPageSample sample(*part);
+  dds::copy_text(sample.page().instance, dds::text_of(request.instance));
+  send_page(client, identity, sample.page());
+}
+
+void ControlServer::Parts::read_trace(const dds::Guid& client, const plc_Request& request) {
+  const plc_SampleIdentity& identity = request.header.request_identity;
+  const auto listing =
+      look_at_trace(pool.name(), dds::text_of(request.instance), trace_query_of(request.part));
+  if (!listing) return tell(client, identity, listing.error().code, listing.error().describe());
+  TracePageSample sample(*listing);
   dds::copy_text(sample.page().instance, dds::text_of(request.instance));
   send_page(client, identity, sample.page());
 }

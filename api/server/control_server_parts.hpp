@@ -101,6 +101,7 @@ struct ControlServer::Parts {
   void read_log(const dds::Guid& client, const plc_Request& request);
   void list_variables(const dds::Guid& client, const plc_Request& request);
   void read_debug(const dds::Guid& client, const plc_Request& request);
+  void read_trace(const dds::Guid& client, const plc_Request& request);
   void tell_variables(std::vector<VariableLister::Finished> finished);
   template <class Page>
   void send_page(const dds::Guid& client, const plc_SampleIdentity& identity, Page& page);

@@ -176,6 +176,29 @@ std::uint32_t FlightPageReader::event_mark(std::size_t index) const noexcept {
   return flight_task_of(memory_, index).event_mark;
 }
 
+std::int32_t FlightPageReader::iec_priority(std::size_t index) const noexcept {
+  return flight_task_of(memory_, index).iec_priority;
+}
+
+// The newest entries first, so that a reader that comes often does not copy whole rings.
+FlightRing::Read FlightPageReader::read_after(std::size_t number, std::int64_t time_ns) const {
+  constexpr std::uint64_t kFirstLook = 256;
+  constexpr std::uint64_t kMoreEachTime = 4;
+  const std::uint64_t end = written_of(memory_, task_count_, number).load(std::memory_order_acquire);
+  for (std::uint64_t look = kFirstLook;; look *= kMoreEachTime) {
+    const std::uint64_t from = end > look ? end - look : 0;
+    FlightRing::Read found = read(number, from);
+    std::vector<FlightEntry>& entries = found.entries;
+    const auto last = std::find_if(entries.rbegin(), entries.rend(),
+                                   [&](const FlightEntry& entry) { return entry.time_ns <= time_ns; });
+    if (last == entries.rend() && from > 0 && look < capacity_) continue;
+    const auto gone = entries.rend() - last;
+    entries.erase(entries.begin(), entries.begin() + gone);
+    found.skipped += static_cast<std::uint64_t>(gone);
+    return found;
+  }
+}
+
 FlightRing::Read FlightPageReader::read(std::size_t number, std::uint64_t from) const {
   return FlightRing::read(written_of(memory_, task_count_, number),
                           words_of(memory_, task_count_, capacity_, number), from);

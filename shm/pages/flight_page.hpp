@@ -133,8 +133,11 @@ class FlightPageReader {
   /// Printable. `index` < task_count().
   [[nodiscard]] std::string task_name(std::size_t index) const;
   [[nodiscard]] std::uint32_t event_mark(std::size_t index) const noexcept;
+  [[nodiscard]] std::int32_t iec_priority(std::size_t index) const noexcept;
   /// Ring `number` < kFirstTaskRing + task_count(). Entries that a stranger has written are not left out.
   [[nodiscard]] FlightRing::Read read(std::size_t number, std::uint64_t from) const;
+  /// The entries behind the last one that is not later than `time_ns`. It looks at few more than these.
+  [[nodiscard]] FlightRing::Read read_after(std::size_t number, std::int64_t time_ns) const;
   /// Place `place` < kLossesKept; nothing: none there. Its text is printable.
   [[nodiscard]] std::optional<LossRecord> loss(std::size_t place) const noexcept;
   /// Changes with each loss in that place.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "shm/pages/debug_page.hpp"
+#include "shm/pages/flight_page.hpp"
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/host_page_copy.hpp"
 #include "shm/pages/log_ring.hpp"
@@ -57,9 +58,14 @@ class Host {
       log_.add({.text = "a line"});
     }
     debug_.write("a state");
+    for (std::size_t number = 0; number < kFirstTaskRing + 1; ++number) {
+      FlightRing ring = flight_.ring(number);
+      for (std::int64_t time = 0; time < 600; ++time) ring.put(TimePoint(Duration(time)), FlightKind::start);
+    }
     for (const std::string& name :
          {host_page_name(pool_name()), transition_ring_name(pool_name(), kInstance),
-          log_ring_name(pool_name(), kInstance), debug_page_name(pool_name(), kInstance)}) {
+          log_ring_name(pool_name(), kInstance), debug_page_name(pool_name(), kInstance),
+          flight_page_name(pool_name(), kInstance)}) {
       memories().push_back(made(MemoryFile::open(name, 1, MemoryFile::Access::read_write)));
     }
   }
@@ -70,6 +76,7 @@ class Host {
     TransitionRing::remove(pool_name(), kInstance);
     LogRing::remove(pool_name(), kInstance);
     DebugPage::remove(pool_name(), kInstance);
+    FlightPage::remove(pool_name(), kInstance);
   }
 
   void read(std::size_t which) {
@@ -80,8 +87,10 @@ class Host {
         return read_transitions();
       case 2:
         return read_log();
-      default:
+      case 3:
         return read_debug_state();
+      default:
+        return read_flight_recorder();
     }
   }
 
@@ -124,10 +133,26 @@ class Host {
     if (read_debug_part(pool_name(), "line2", {})) std::abort();
   }
 
+  static void read_flight_recorder() {
+    const auto reader = FlightPageReader::open(pool_name(), kInstance);
+    if (!reader) return;
+    for (std::size_t number = 0; number < kFirstTaskRing + reader->task_count(); ++number) {
+      for (const std::int64_t time : {std::int64_t{0}, std::int64_t{590}, INT64_MAX}) {
+        const FlightRing::Read read = reader->read_after(number, time);
+        if (read.entries.size() > flight_capacity(reader->task_count())) std::abort();
+        for (const FlightEntry& entry : read.entries)
+          if (entry.time_ns <= time) std::abort();
+      }
+    }
+    for (std::size_t task = 0; task < reader->task_count(); ++task)
+      if (!is_printable(reader->task_name(task))) std::abort();
+  }
+
   HostPageWriter page_ = made(HostPageWriter::create(pool_name()));
   TransitionRing transitions_ = made(TransitionRing::open(pool_name(), kInstance));
   LogRing log_ = made(LogRing::open(pool_name(), kInstance));
   DebugPage debug_ = made(DebugPage::create(pool_name(), kInstance));
+  FlightPage flight_ = made(FlightPage::create(pool_name(), kInstance, std::array{FlightTask{}}));
 };
 
 }  // namespace

@@ -16,9 +16,9 @@ namespace plchost {
 namespace {
 
 // By SessionTable::Stream.
-constexpr std::array kStreamTopics{dds::kReply,       dds::kEventAck,     dds::kObjectPage,
-                                   dds::kNodePage,    dds::kLogPage,      dds::kEventRun,
-                                   dds::kDownloadAck, dds::kVariablePage, dds::kDebugPage};
+constexpr std::array kStreamTopics{dds::kReply,     dds::kEventAck, dds::kObjectPage,  dds::kNodePage,
+                                   dds::kLogPage,   dds::kEventRun, dds::kDownloadAck, dds::kVariablePage,
+                                   dds::kDebugPage, dds::kTracePage};
 
 }  // namespace
 
@@ -192,6 +192,10 @@ bool SessionTable::write_page(const dds::Guid& client, const plc_VariablePage& p
 
 bool SessionTable::write_page(const dds::Guid& client, const plc_DebugPage& page) {
   return write(client, Stream::debug, &page);
+}
+
+bool SessionTable::write_page(const dds::Guid& client, const plc_TracePage& page) {
+  return write(client, Stream::traces, &page);
 }
 
 bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sample) {

@@ -52,6 +52,7 @@ class SessionTable {
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_LogPage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_VariablePage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_DebugPage& page);
+  [[nodiscard]] bool write_page(const dds::Guid& client, const plc_TracePage& page);
 
   /// The client's own words about itself, and its GUID.
   [[nodiscard]] std::string describe(const dds::Guid& client) const;
@@ -68,8 +69,19 @@ class SessionTable {
 
  private:
   /// The topics to each client, over a writer of its own.
-  enum class Stream : std::uint8_t { replies, acks, objects, nodes, logs, runs, downloads, variables, debug };
-  static constexpr std::size_t kStreams = 9;
+  enum class Stream : std::uint8_t {
+    replies,
+    acks,
+    objects,
+    nodes,
+    logs,
+    runs,
+    downloads,
+    variables,
+    debug,
+    traces
+  };
+  static constexpr std::size_t kStreams = 10;
   struct Session {
     dds::Entity publisher;
     std::array<dds::Entity, kStreams> writers = {};

@@ -72,6 +72,8 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_LIST_ROUTES, ""), ApiRole::operating)->verb, ControlVerb::list_routes);
   EXPECT_EQ(check(make(plc_OPERATION_READ_LOG), ApiRole::operating)->verb, ControlVerb::read_log);
   EXPECT_FALSE(check(make(plc_OPERATION_READ_LOG, ""), ApiRole::operating)) << "of one instance";
+  EXPECT_EQ(check(make(plc_OPERATION_READ_TRACE), ApiRole::operating)->verb, ControlVerb::read_trace);
+  EXPECT_FALSE(check(make(plc_OPERATION_READ_TRACE), ApiRole::viewing)) << "as the log";
   EXPECT_EQ(check(make(plc_OPERATION_LIST_VARIABLES), ApiRole::viewing)->verb, ControlVerb::list_variables);
   EXPECT_EQ(check(make(plc_OPERATION_READ_DEBUG), ApiRole::engineering)->verb, ControlVerb::read_debug);
   EXPECT_FALSE(check(make(plc_OPERATION_READ_DEBUG, "line1", "3 500"), ApiRole::engineering)) << "text";
