@@ -1,6 +1,3 @@
-#include <cerrno>
-#include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <memory>
 #include <optional>
@@ -9,12 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/own_file.hpp"
 #include "api/cli/rows/host_rows.hpp"
 #include "api/cli/rows/log_rows.hpp"
 #include "api/cli/rows/rows.hpp"
@@ -26,8 +21,6 @@
 #include "api/client/log_reader.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/unique_fd.hpp"
-#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 
@@ -130,38 +123,19 @@ class Report {
   std::vector<std::string> parts_missing_;
 };
 
-/// The user names it: a link, a folder or a device stays as it is.
-Result<void> check_is_plain(const std::string& file) {
-  struct stat status{};
-  if (::lstat(file.c_str(), &status) != 0 || S_ISREG(status.st_mode)) return {};
-  return failure(
-      ErrorCode::wrong_type,
-      fmt::format("{} is no plain file: name a plain file, or one that is not there", printable(file)));
-}
-
-/// The user's own "FILE.new" stays as it is.
-Result<void> write_for_owner(const std::string& file, std::string_view text) {
-  std::string fresh = file + ".XXXXXX";
-  if (const UniqueFd made(::mkostemp(fresh.data(), O_CLOEXEC)); !made)
-    return failure(ErrorCode::system, fmt::format("cannot make a file beside {}", printable(file)), errno);
-  constexpr mode_t kForOwner = 0600;  // the lines of the log are the application's
-  auto written = write_whole_file(fresh, text, kForOwner);
-  if (written && ::rename(fresh.c_str(), file.c_str()) != 0)
-    written = failure(ErrorCode::system, fmt::format("cannot replace {}", printable(file)), errno);
-  if (!written) ::unlink(fresh.c_str());
-  return written;
-}
-
 int save_report(CliSession& session, const std::string& instance, const std::string& file,
                 const std::string& audit, const std::string& version) {
-  if (const auto plain = check_is_plain(file); !plain) return CliSession::fail(plain.error());
+  auto own = OwnFile::create(file);
+  if (!own) return CliSession::fail(own.error());
   auto host = session.target_host();
   if (!host) return CliSession::fail(host.error());
   Report report(session, *std::move(host), instance, audit);
   const auto made = report.make(version);
   if (!made) return CliSession::fail(made.error());
   const std::string text = made->dump(2, ' ', true, Row::error_handler_t::replace) + "\n";
-  if (const auto written = write_for_owner(file, text); !written) return CliSession::fail(written.error());
+  auto written = own->write(text);
+  if (written) written = own->put_in_place();
+  if (!written) return CliSession::fail(written.error());
   for (const std::string& part : report.parts_missing()) {
     session.say(printable(fmt::format("{} has not all: {}", file, part)));
   }

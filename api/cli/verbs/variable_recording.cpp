@@ -63,7 +63,7 @@ int sample_until_interrupted(VariableSampler& sampler, const SampleTimes& times,
 
 void add_record_variables(const Command& plcctl, CliSession& session) {
   const auto arguments = std::make_shared<RecordArguments>();
-  plcctl.verb("record", "Write samples of variables into a file")
+  plcctl.verb("record", "Write samples of variables, or what tasks do, into a file")
       .noun("variables", "Samples of variables as CSV, each of one moment in which no task is within a cycle",
             [&session, arguments] { return record(session, *arguments); })
       .argument("INSTANCE", arguments->instance)

@@ -13,6 +13,7 @@
 #include "api/cli/output.hpp"
 #include "api/cli/rows/variable_rows.hpp"
 #include "api/cli/verbs/host_commands.hpp"
+#include "api/cli/verbs/trace_recording.hpp"
 #include "api/cli/verbs/variable_changes.hpp"
 #include "api/cli/verbs/variable_recording.hpp"
 #include "api/cli/verbs/variable_sampler.hpp"
@@ -237,6 +238,7 @@ void add_variable_verbs(const Command& plcctl, CliSession& session) {
       .optional("VARIABLE", unforced->which.names, "their names")
       .flag("--all", unforced->all, "all forced variables of the instance");
   add_record_variables(plcctl, session);
+  add_record_trace(plcctl, session);
 }
 
 }  // namespace plchost
