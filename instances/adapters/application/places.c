@@ -13,9 +13,9 @@
  * have changed it in one cycle, the program's value holds. Of places that share bits, this is true of each
  * bit by itself.
  *
- * Outputs and memory whose places share bits: each has a value. Within a task they are one memory, as what
- * one of them is assigned is passed on to the others, in the order of the statements. What is changed in
- * another way, by an operator or a reference, is passed on when the values are settled: the narrow ones last.
+ * Outputs and memory whose places share bits: each has a value. Within a task they are one memory, as a value
+ * that one of them is assigned is passed on to the others, in the order of the statements. Other changes, by
+ * an operator, a force or a reference, are passed on when the places are settled: the narrow ones last.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -199,8 +199,8 @@ int plchost_settle_forced_places(const struct plchost_task* task) {
   return settle(task, 1);
 }
 
-/* What is put with one of them is put of all of them, and nobody puts it again: firmware may have changed it.
- * Before it is in the area, as then no other task takes one of them. */
+/* Bits that are put with one of them count as put with all of them, so nobody puts them again: firmware may
+ * have changed them. Before they are in the area, as then no other task takes one of them. */
 static void count_as_put(const struct plchost_task* task, const struct plchost_use* use,
                          unsigned long long value, unsigned long long bits) {
   const struct plchost_place* const place = &plchost_places[use->place];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <numeric>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -129,12 +130,13 @@ void GlueWriter::write_locations() {
   print("const struct plchost_location plchost_locations[] = {{\n{}  {{0}}}};\n", table);
 }
 
-// In the order of their begins. One that begins before the others have ended shares bits.
+// In the order of their begins, the widest first. One that begins before the others have ended shares bits.
 void GlueWriter::find_aliases() {
   std::vector<std::size_t> order(places_.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, {}, [&](std::size_t number) {
-    return std::pair(places_[number].place.area, first_bit(places_[number].place));
+    const Place& place = places_[number].place;
+    return std::tuple(place.area, first_bit(place), first_bit(place) - end_bit(place), number);
   });
   unsigned end = 0;
   for (const std::size_t number : order) {

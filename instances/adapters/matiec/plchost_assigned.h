@@ -7,11 +7,12 @@
 
 #include "accessor.h"
 
-/* The value may have commas: a text. */
-#define PLCHOST_ASSIGN(variable, ...)                                       \
-  {                                                                         \
-    __typeof__(variable) plchost_new = __VA_ARGS__;                         \
-    if (!plchost_assign(&(variable), &plchost_new)) variable = plchost_new; \
+/* Once, also if an index is in it. The value may have commas: a text. */
+#define PLCHOST_ASSIGN(variable, ...)                                         \
+  {                                                                           \
+    __typeof__(variable)* const plchost_at = &(variable);                     \
+    const __typeof__(variable) plchost_new = __VA_ARGS__;                     \
+    if (!plchost_assign(plchost_at, &plchost_new)) *plchost_at = plchost_new; \
   }
 
 #undef __SET_LOCATED

@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-struct Words {
+struct SharedWords {
   std::uint16_t assigned = 0, left = 0, flags = 0, unused = 0;
   std::int32_t lost = 0, sets = 0;
 };
@@ -26,9 +26,10 @@ class TextWithSharedBits : public TranslatedText {
   }
   // For a while, of which each cycle counts.
   void expect_in_each_cycle(std::uint16_t value) {
-    ASSERT_TRUE(eventually([&] { return outputs<Words>().assigned == value; })) << outputs<Words>().assigned;
+    ASSERT_TRUE(eventually([&] { return outputs<SharedWords>().assigned == value; }))
+        << outputs<SharedWords>().assigned;
     const std::uint64_t first = cycles();
-    while (cycles() < first + 200) ASSERT_EQ(outputs<Words>().assigned, value);
+    while (cycles() < first + 200) ASSERT_EQ(outputs<SharedWords>().assigned, value);
   }
   std::uint64_t cycles() { return sut->task("fast")->counters.cycles; }
 };
@@ -40,7 +41,8 @@ constexpr const char* kShared = R"(
 PROGRAM Main
   VAR
     all AT %QW0 : WORD; pump AT %QX0.0 : BOOL; valve AT %QX0.1 : BOOL;
-    word AT %QW1 : WORD; bit AT %QX2.0 : BOOL;
+    whole AT %QW1 : WORD; bit AT %QX2.0 : BOOL;
+    flags AT %QW2 : WORD; last AT %MX20.0 : BOOL;
     stop, lamp : BOOL;
     n : INT;
   END_VAR
@@ -49,7 +51,7 @@ PROGRAM Main
   valve := n MOD 3 < 5;
   n := n + 1;
   IF lamp THEN bit := TRUE; END_IF;
-  IF stop THEN word := 0; END_IF;
+  IF stop THEN whole := 0; END_IF;
 END_PROGRAM
 CONFIGURATION cell
   RESOURCE press ON PLC
@@ -60,12 +62,12 @@ END_CONFIGURATION
 )";
 
 TEST_P(TextWithSharedBits, HasItsStatementsInOrderInEachCycle) {
-  build_and_start(kShared);
+  ASSERT_NO_FATAL_FAILURE(build_and_start(kShared));
   expect_in_each_cycle(0x0103);
 }
 
 TEST_P(TextWithSharedBits, HasAForcedBitInEachCycle) {
-  build_and_start(kShared);
+  ASSERT_NO_FATAL_FAILURE(build_and_start(kShared));
   ValueClient client(sandbox);
   EXPECT_EQ(sut->ask(ControlVerb::force_variable, "one.valve=FALSE").code, ErrorCode::ok);
   expect_in_each_cycle(0x0101);
@@ -80,18 +82,18 @@ TEST_P(TextWithSharedBits, HasAForcedBitInEachCycle) {
 }
 
 TEST_P(TextWithSharedBits, KeepsWhatAnOperatorWrites) {
-  build_and_start(kShared);
+  ASSERT_NO_FATAL_FAILURE(build_and_start(kShared));
   ValueClient client(sandbox);
   const auto write = [&](const std::string& text) {
     EXPECT_EQ(sut->ask(ControlVerb::write_variable, text).code, ErrorCode::ok);
   };
   const auto soon = [&](std::uint16_t left, const std::string& bit) {
-    return eventually([&] { return outputs<Words>().left == left && client.read("one.bit") == bit; });
+    return eventually([&] { return outputs<SharedWords>().left == left && client.read("one.bit") == bit; });
   };
   write("one.bit=TRUE");
   EXPECT_TRUE(soon(1, "TRUE"));
-  EXPECT_EQ(client.read("one.word"), "16#0001");
-  write("one.word=16#0200");
+  EXPECT_EQ(client.read("one.whole"), "16#0001");
+  write("one.whole=16#0200");
   EXPECT_TRUE(soon(0x0200, "FALSE"));
   write("one.lamp=TRUE");
   EXPECT_TRUE(soon(0x0201, "TRUE"));
@@ -101,24 +103,24 @@ TEST_P(TextWithSharedBits, KeepsWhatAnOperatorWrites) {
 }
 
 TEST_P(TextWithSharedBits, HasTheInitialValuesOfNewPlacesAfterAnOnlineChange) {
-  build_and_start(kShared);
+  ASSERT_NO_FATAL_FAILURE(build_and_start(kShared));
   std::string text = kShared;
   text.replace(text.find("n : INT;"), 8,
-               "n : INT; fresh AT %MX10.0 : BOOL := TRUE; third AT %QX2.3 : BOOL := TRUE;\n"
-               "    flags AT %QW2 : WORD;");
+               "n : INT; fresh AT %MX10.0 : BOOL := TRUE; third AT %QX2.3 : BOOL := TRUE;");
   text.replace(text.find("n := n + 1;"), 11, "n := n + 1; IF fresh THEN flags := flags OR 16#0004; END_IF;");
   const ProgramEnd built = build(text, "next");
   ASSERT_TRUE(built.success()) << built.output;
-  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "one.word=16#0100").code, ErrorCode::ok);
-  EXPECT_TRUE(eventually([&] { return outputs<Words>().left == 0x0100; }));
+  EXPECT_EQ(sut->ask(ControlVerb::write_variable, "one.whole=16#0100").code, ErrorCode::ok);
+  EXPECT_TRUE(eventually([&] { return outputs<SharedWords>().left == 0x0100; }));
   const ControlReply reply = sut->ask(ControlVerb::change_application, so("next"));
   EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
-  EXPECT_TRUE(eventually([&] { return outputs<Words>().left == 0x0108; })) << outputs<Words>().left;
-  EXPECT_TRUE(eventually([&] { return outputs<Words>().flags == 4; }));
+  EXPECT_TRUE(eventually([&] { return outputs<SharedWords>().left == 0x0108; }))
+      << outputs<SharedWords>().left;
+  EXPECT_TRUE(eventually([&] { return outputs<SharedWords>().flags == 4; }));
 }
 
-constexpr const char* kTwoTasks = R"(
-PROGRAM Words
+constexpr const char* kWordsAndBits = R"(
+PROGRAM Toggles
   VAR_EXTERNAL words : WORD; END_VAR
   VAR i, m : DINT; END_VAR
   words := words XOR 16#0100;
@@ -140,20 +142,20 @@ CONFIGURATION cell
   RESOURCE press ON PLC
     TASK fast (INTERVAL := T#1ms, PRIORITY := 1);
     TASK slow (INTERVAL := T#3ms, PRIORITY := 5);
-    PROGRAM one WITH slow : Words;
+    PROGRAM one WITH slow : Toggles;
     PROGRAM two WITH fast : Bits;
   END_RESOURCE
 END_CONFIGURATION
 )";
 
 TEST_P(TextWithSharedBits, OfTwoTasksLosesNoBitInTheMemory) {
-  const ProgramEnd built = build(kTwoTasks, "shared");
+  const ProgramEnd built = build(kWordsAndBits, "shared");
   ASSERT_TRUE(built.success()) << built.output;
   EXPECT_THAT(built.output, HasSubstr("%MX0.0 and %MW0 share bits, and the tasks fast, slow use them: a task "
                                       "has what another one assigns there from its next cycle on"));
   start(so("shared"));
-  EXPECT_TRUE(eventually([&] { return outputs<Words>().sets > 500; }));
-  EXPECT_EQ(outputs<Words>().lost, 0);
+  EXPECT_TRUE(eventually([&] { return outputs<SharedWords>().sets > 500; }));
+  EXPECT_EQ(outputs<SharedWords>().lost, 0);
 }
 
 constexpr const char* kOneAddress = R"(
@@ -184,11 +186,11 @@ TEST_P(TextWithSharedBits, MayDeclareOneAddressSeveralTimes) {
   for (const char* const task : {"fast", "slow"}) {
     text.replace(text.find("two WITH ") + 9, 4, task);
     clear();
-    build_and_start(text);
+    ASSERT_NO_FATAL_FAILURE(build_and_start(text));
     put({.bits = 1});
-    EXPECT_TRUE(eventually([&] { return outputs<Words>().assigned == 0x0301; })) << task;
+    EXPECT_TRUE(eventually([&] { return outputs<SharedWords>().assigned == 0x0301; })) << task;
     put({.bits = 0});
-    EXPECT_TRUE(eventually([&] { return outputs<Words>().assigned == 0; })) << task;
+    EXPECT_TRUE(eventually([&] { return outputs<SharedWords>().assigned == 0; })) << task;
   }
 }
 

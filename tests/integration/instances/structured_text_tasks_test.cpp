@@ -145,6 +145,35 @@ END_RESOURCE END_CONFIGURATION
   EXPECT_EQ(sut->runtime().scheduler.view(), "CmpScheduleTimer");
 }
 
+// The edge is that of the area. As long as the slow task may be in its cycle, the flag is a value within
+// that.
+TEST_P(TextWithATaskFile, PutsOutTheMemoryOfATaskThatWasStoppedInItsCycle) {
+  constexpr const char* kStopped = R"(
+PROGRAM Slow VAR_EXTERNAL flag : BOOL; END_VAR VAR go AT %IX0.0 : BOOL; zero : INT; END_VAR
+  IF go THEN flag := TRUE; zero := 10 / zero; END_IF;
+END_PROGRAM
+PROGRAM Fast VAR_EXTERNAL flag : BOOL; END_VAR VAR twice AT %QW1 : INT; END_VAR
+  IF flag THEN twice := 7; END_IF;
+END_PROGRAM
+PROGRAM Edge VAR edges AT %QB4 : USINT; END_VAR edges := edges + 1; END_PROGRAM
+CONFIGURATION cell VAR_GLOBAL flag AT %MX0.0 : BOOL; END_VAR RESOURCE press ON PLC
+  TASK fast (INTERVAL := T#1ms, PRIORITY := 1);
+  TASK slow (INTERVAL := T#5ms, PRIORITY := 5);
+  TASK edge (SINGLE := flag, PRIORITY := 0);
+  PROGRAM one WITH fast : Fast;
+  PROGRAM two WITH slow : Slow;
+  PROGRAM three WITH edge : Edge;
+END_RESOURCE END_CONFIGURATION
+)";
+  (void)sandbox.write("twice.toml", "[task.slow]\nwatchdog_policy = 'task'\n");
+  const ProgramEnd built = build(kStopped);
+  ASSERT_TRUE(built.success()) << built.output;
+  start(so("twice"));
+  put({.bits = 1});
+  EXPECT_TRUE(eventually([&] { return outputs().twice == 7; }));
+  EXPECT_TRUE(eventually([&] { return outputs().edges == 1; }));
+}
+
 struct OpenPlcImage {
   std::uint8_t bits = 0, unused[2047]{};
   std::int16_t words[2]{};

@@ -284,44 +284,18 @@ TEST_F(MatiecGlue, RefusesOutputsThatShareBitsInTwoTasks) {
       << "the second program has what the first one has written";
 }
 
-TEST_F(MatiecGlue, HasOneValueOfAnAddressThatIsDeclaredTwice) {
-  const std::vector<Located> located(2, {"BOOL", "__IX0_0", "%IX0.0"});
-  const Glue glue = write(
-      "PROGRAM A VAR a AT %IX0.0 : BOOL; END_VAR END_PROGRAM PROGRAM B VAR b AT %IX0.0 : BOOL; END_VAR "
-      "END_PROGRAM",
-      "", std::string(kFast) + "PROGRAM one WITH fast : A; PROGRAM two WITH fast : B;", located);
-  EXPECT_THAT(texts(glue.problems), IsEmpty());
-  EXPECT_THAT(glue.text, HasSubstr("plchost_place_count = 1;"));
-  const std::string definition = "BOOL *__IX0_0 = &plchost_value_0;\n";
-  const std::size_t first = glue.text.find(definition);
-  ASSERT_NE(first, std::string::npos);
-  EXPECT_EQ(glue.text.find(definition, first + 1), std::string::npos);
-}
-
-// The word of the fast task, its two bits, and a bit of the same bytes that only the slow task has.
+// The word and its two bits, of which one is declared twice.
 TEST_F(MatiecGlue, JoinsThePlacesOfATaskThatShareBits) {
   const Glue glue = write(
-      "PROGRAM A VAR a AT %MX0.0 : BOOL; b AT %MW0 : WORD; c AT %MX1.0 : BOOL; d AT %MX4.0 : BOOL; END_VAR "
-      "END_PROGRAM PROGRAM B VAR e AT %MX0.1 : BOOL; END_VAR END_PROGRAM",
-      "",
-      std::string(kFast) +
-          "TASK slow (INTERVAL := T#1s, PRIORITY := 5); PROGRAM one WITH fast : A; PROGRAM two WITH slow : "
-          "B;",
+      "PROGRAM A VAR a AT %MX0.0 : BOOL; b AT %MW0 : WORD; END_VAR END_PROGRAM "
+      "PROGRAM B VAR c AT %MX0.0 : BOOL; d AT %MX1.0 : BOOL; END_VAR END_PROGRAM",
+      "", std::string(kFast) + "PROGRAM one WITH fast : A; PROGRAM two WITH fast : B;",
       {{"BOOL", "__MX0_0", "%MX0.0"},
        {"WORD", "__MW0", "%MW0"},
-       {"BOOL", "__MX1_0", "%MX1.0"},
-       {"BOOL", "__MX4_0", "%MX4.0"},
-       {"BOOL", "__MX0_1", "%MX0.1"}});
-  EXPECT_THAT(texts(glue.problems), IsEmpty());
+       {"BOOL", "__MX0_0", "%MX0.0"},
+       {"BOOL", "__MX1_0", "%MX1.0"}});
   EXPECT_THAT(glue.text, HasSubstr("plchost_uses_0[] = {\n  {1, &plchost_value_1, 0, 1},\n"
-                                   "  {0, &plchost_value_0, 0, 2},\n  {2, &plchost_value_2, 0, 0},\n"
-                                   "  {3, &plchost_value_3, 0, 0},\n  {0}}"));
-  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_0, 0, plchost_retained_0, 0, 0, 3},"));
-  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1, 0, plchost_retained_1, 0, 0, 0},"));
-  EXPECT_THAT(glue.text, HasSubstr("#include \"plchost_assigned.h\"\n#include \"press.c\""));
-  EXPECT_THAT(texts(glue.remarks),
-              Contains(HasSubstr("%MX0.1 and %MW0 share bits, and the tasks fast, slow use them: a task has "
-                                 "what another one assigns there from its next cycle on")));
+                                   "  {0, &plchost_value_0, 0, 2},\n  {2, &plchost_value_2, 0, 0},\n  {0}}"));
 }
 
 TEST_F(MatiecGlue, PlacesLocationsOfSeveralNumbers) {
