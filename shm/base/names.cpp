@@ -1,6 +1,7 @@
 #include "shm/base/names.hpp"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <ranges>
 #include <vector>
@@ -27,13 +28,30 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-// The bytes of the character that the text begins with; 0: not one, or a control character.
+struct CodeRange {
+  char32_t first;
+  char32_t last;
+};
+// Control characters. Then what makes two lines of one, shows a text in another order than it has, or shows
+// nothing, so that two texts look like one. U+200C and U+200D stay: the words of some languages need them.
+constexpr std::array<CodeRange, 9> kUnprintable = {{{0, 0x1f},
+                                                    {0x7f, 0x9f},
+                                                    {0x61c, 0x61c},
+                                                    {0x200b, 0x200b},
+                                                    {0x200e, 0x200f},
+                                                    {0x2028, 0x202e},
+                                                    {0x2060, 0x2060},
+                                                    {0x2066, 0x2069},
+                                                    {0xfeff, 0xfeff}}};
+
+// The bytes of the character that the text begins with; 0: not one, or not printable.
 std::size_t printable_character(std::string_view text) noexcept {
   const auto character = first_utf8(text);
   if (!character) return 0;
-  const char32_t code = character->code;
-  const bool is_control = code < 0x20 || (code >= 0x7f && code < 0xa0);
-  return is_control ? 0 : character->bytes;
+  const auto has_it = [&](CodeRange range) {
+    return character->code >= range.first && character->code <= range.last;
+  };
+  return std::ranges::any_of(kUnprintable, has_it) ? 0 : character->bytes;
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 /// A-Z a-z 0-9 _ - and the dot.
 [[nodiscard]] bool is_name_character(char c) noexcept;
 
-/// Whether it is well-formed UTF-8 without control characters.
+/// Whether it is well-formed UTF-8 without control characters, and without those that change the order in
+/// which others are shown (U+202E), end a line (U+2028) or are not seen (U+200B, U+FEFF).
 [[nodiscard]] bool is_printable_utf8(std::string_view text) noexcept;
 
 /// The text with '?' in place of each byte that could drive a terminal or make two lines of one, or is no
@@ -42,7 +43,7 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 /// The same of each line of a text.
 [[nodiscard]] std::string printable_lines(std::string_view text);
 
-/// Whether an object may have this name: 1 to kMaxObjectName bytes of UTF-8 without control characters.
+/// Whether an object may have this name: 1 to kMaxObjectName bytes, and is_printable_utf8().
 [[nodiscard]] bool is_object_name(std::string_view name) noexcept;
 /// The same; invalid_argument says what is allowed.
 [[nodiscard]] Result<void> check_object_name(std::string_view name);

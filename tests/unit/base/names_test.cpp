@@ -89,6 +89,17 @@ TEST(Names, OfAStrangerAreShownWithoutWhatCouldDriveATerminalOrBreakALine) {
   EXPECT_EQ(join_some(std::vector<std::string>{"a\tb", "c"}), "a?b, c");
 }
 
+TEST(Names, AreNotPrintableWithCharactersThatChangeTheOrderOrAreNotSeen) {
+  for (const std::string bad :
+       {"\u202e", "\u200b", "\u2066", "\u2069", "\ufeff", "\u2028", "\u2029", "\u200f", "\u0085"}) {
+    EXPECT_FALSE(is_printable_utf8("a" + bad + "b")) << bad;
+    EXPECT_EQ(printable("a" + bad + "b"), "a" + std::string(bad.size(), '?') + "b");
+  }
+  for (const std::string good : {"\u200c", "\u200d", "\u2010", "\u2027", "\u202f", "\u2065", "\u206a",
+                                 "\u20ac", "\u00a0", "\U0001f600"})
+    EXPECT_TRUE(is_printable_utf8("a" + good + "b")) << good;
+}
+
 TEST(Names, JoinsTheFirstOfALongList) {
   std::vector<std::string> names(kShownNames, "a");
   EXPECT_THAT(join_some(names), testing::Not(HasSubstr("more")));

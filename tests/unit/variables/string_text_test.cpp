@@ -108,6 +108,9 @@ TEST(WideStrings, AreShownInUtf8) {
   EXPECT_EQ(text_of(units({0xd83d, 'x'})), "\"$D83Dx\"") << "without its second half";
   EXPECT_EQ(text_of(units({0xde00, 0xd83d})), "\"$DE00$D83D\"") << "the wrong way round";
   EXPECT_EQ(text_of(units({0xd83d, 0xd83d, 0xde00})), "\"$D83D😀\"");
+  EXPECT_EQ(text_of(units({'a', 0x202e, 'b', 0x200b, 0x2067, 0xfeff, 0x2028, 'c'})),
+            "\"a$202Eb$200B$2067$FEFF$2028c\"")
+      << "it would be shown in another order, or not at all";
 }
 
 TEST(WideStrings, AreReadInEachForm) {
