@@ -179,9 +179,10 @@ bool TaskSet::stands_still() const noexcept {
 std::vector<std::string_view> TaskSet::tasks_in_cycle() const {
   std::vector<std::string_view> names;
   for (const auto& task : tasks_) {
-    if (task->in_cycle()) names.emplace_back(task->config().name);
+    if (task->in_cycle() && !task->trap().parked()) names.emplace_back(task->config().name);
   }
-  if (names.empty() && poller_.trap().seat().taken()) names.emplace_back("event variables");
+  if (names.empty() && poller_.trap().seat().taken() && !poller_.parked())
+    names.emplace_back("event variables");
   return names;
 }
 

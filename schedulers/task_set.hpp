@@ -182,7 +182,8 @@ class TaskSet {
   /// Some task stands still in the middle of a cycle: see Task::stand_still(). Within an action of
   /// between_cycles().
   [[nodiscard]] bool stands_still() const noexcept;
-  /// Those that are within a cycle just now, or in their event variables.
+  /// Those that are within a cycle just now, or in their event variables. None whose thread a fault has ended
+  /// there: it never goes on, but has_parked_thread() then.
   [[nodiscard]] std::vector<std::string_view> tasks_in_cycle() const;
 
   /// In the order in which they were given. The calls on a task that each context may make: see Task.

@@ -33,11 +33,12 @@ Result<std::string> Instance::begin_change(const std::string& path) {
   return {};
 }
 
-// A task that halts in the middle of a cycle would go on in code that is gone.
+// A task that halts in the middle of a cycle would go on in code that is gone. A thread that a fault has
+// ended has its stack in there.
 std::optional<Duration> Instance::take_over_now() {
   bool whole = false;
   const auto held = tasks_->between_cycles([&] {
-    whole = !tasks_->stands_still();
+    whole = !tasks_->stands_still() && !tasks_->has_parked_thread();
     if (whole) change_->take_over();
   });
   return whole ? held : std::nullopt;

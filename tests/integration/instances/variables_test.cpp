@@ -239,6 +239,26 @@ TEST_F(Variables, OfAnApplicationInExceptionAreReadOnly) {
   EXPECT_THAT(process_->log(), HasSubstr("1 force ended, because the process ends: Main.input"));
 }
 
+// Its thread never goes on, so nothing of it has to be waited for.
+TEST(VariablesBesideATaskInException, AreReadWrittenAndForced) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--application", application("seen"), "--settings",
+                                sandbox.write("line1.cfg", "[Task.Main]\nWatchdog.Policy=Task\n")});
+  sut.wait_until_up();
+  ValueClient client(sandbox);
+  ASSERT_EQ(sut.ask(ControlVerb::write_variable, "Main.crash=TRUE").code, ErrorCode::ok);
+  ASSERT_TRUE(eventually([&] { return sut.task("Main")->state == PageTaskState::exception; }));
+  EXPECT_EQ(sut.runtime().state, ApplicationState::running);
+  EXPECT_EQ(sut.ask(ControlVerb::write_variable, "Line.temperature[10]=-1.5").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("Line.temperature[10]"), "-1.5");
+  EXPECT_EQ(sut.ask(ControlVerb::force_variable, "Main.input=4").code, ErrorCode::ok);
+  EXPECT_EQ(client.read("Main.input"), "4");
+  EXPECT_TRUE(client.ask(client.elements({"Main.crash", "Main.input"})).consistent);
+  EXPECT_EQ(sut.ask(ControlVerb::unforce_variable, "*").code, ErrorCode::ok);
+  EXPECT_EQ(sut.ask(ControlVerb::change_application, application("seen")).code, ErrorCode::wrong_state);
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+}
+
 class StoppedVariables : public Variables {
  protected:
   StoppedVariables() : Variables({"--stopped"}) {}
