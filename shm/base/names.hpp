@@ -33,8 +33,8 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 /// A-Z a-z 0-9 _ - and the dot.
 [[nodiscard]] bool is_name_character(char c) noexcept;
 
-/// Whether it is well-formed UTF-8 without control characters, and without those that change the order in
-/// which others are shown (U+202E), end a line (U+2028) or are not seen (U+200B, U+FEFF).
+/// Whether it is well-formed UTF-8 without control characters. Characters that change the order of others
+/// (U+202E), end a line (U+2028) or are not seen (U+200B, U+FEFF) count as these.
 [[nodiscard]] bool is_printable_utf8(std::string_view text) noexcept;
 
 /// The text with '?' in place of each byte that could drive a terminal or make two lines of one, or is no

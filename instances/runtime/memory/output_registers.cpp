@@ -9,10 +9,7 @@ namespace plchost {
 
 OutputRegisters::OutputRegisters(std::span<std::byte> registers, std::vector<ByteRange> ranges,
                                  std::span<const std::byte> initial, std::vector<std::byte> safe)
-    : registers_(registers),
-      ranges_(std::move(ranges)),
-      safe_(std::move(safe)),
-      changed_(registers.size()) {
+    : registers_(registers), ranges_(std::move(ranges)), safe_(std::move(safe)), changed_(registers.size()) {
   for (std::size_t at = 0; at < changed_.size(); ++at)
     changed_[at].store(initial[at], std::memory_order_relaxed);
 }

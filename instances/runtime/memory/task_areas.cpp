@@ -53,7 +53,7 @@ void OutputView::refresh() noexcept {
 }
 
 void OutputView::begin_cycle() noexcept {
-  // Registers: what was written between the cycles, by an operator, is a change.
+  // In registers a value that an operator has written between the cycles is a change.
   if (writes_.sole || registers_ != nullptr) return;
   // A value that is not out yet is still a change.
   if (late_) return;

@@ -118,27 +118,30 @@ TEST_F(DifferencesOfStrucpp, ADifferenceThatWrapsWhereItIsComparedIsTold) {
 
 // A caller knows other variables of these names, or none.
 TEST_F(DifferencesOfStrucpp, InitialValuesThatNameAConstantOfTheBlockAreNotTakenForAGlobal) {
-  const ProgramEnd end = built("b : Base; h : Heir; i : INT;",
-                               "i := b.Join(b := 2); i := h.More();\ni := b.Join();\ni := b.Odd();\n"
-                               "i := b.Join(a := 1) + h.More(2) + b.Odd(3);",
-                               "VAR_GLOBAL CONSTANT kMost : INT := 9; END_VAR FUNCTION_BLOCK Base VAR CONSTANT kMost : INT := "
-                               "5; END_VAR METHOD PUBLIC Join : INT VAR_INPUT a : INT := kMost; b : INT := 8; END_VAR "
-                               "Join := a + b; END_METHOD METHOD PUBLIC Odd : INT VAR_INPUT a : INT := kNone; END_VAR "
-                               "Odd := a; END_METHOD END_FUNCTION_BLOCK FUNCTION_BLOCK Heir EXTENDS Base METHOD "
-                               "PUBLIC More : INT VAR_INPUT a : INT := kMost; END_VAR More := a; END_METHOD "
-                               "END_FUNCTION_BLOCK");
+  const ProgramEnd end =
+      built("b : Base; h : Heir; i : INT;",
+            "i := b.Join(b := 2); i := h.More();\ni := b.Join();\ni := b.Odd();\n"
+            "i := b.Join(a := 1) + h.More(2) + b.Odd(3);",
+            "VAR_GLOBAL CONSTANT kMost : INT := 9; END_VAR FUNCTION_BLOCK Base VAR CONSTANT kMost : INT := "
+            "5; END_VAR METHOD PUBLIC Join : INT VAR_INPUT a : INT := kMost; b : INT := 8; END_VAR "
+            "Join := a + b; END_METHOD METHOD PUBLIC Odd : INT VAR_INPUT a : INT := kNone; END_VAR "
+            "Odd := a; END_METHOD END_FUNCTION_BLOCK FUNCTION_BLOCK Heir EXTENDS Base METHOD "
+            "PUBLIC More : INT VAR_INPUT a : INT := kMost; END_VAR More := a; END_METHOD "
+            "END_FUNCTION_BLOCK");
   EXPECT_FALSE(end.success());
-  expect_told(end, {"other.st:4:6: JOIN: STruC++ wants each parameter in this call of a method; add A := ...",
-                    "other.st:4:27: MORE: STruC++ wants each parameter in this call of a method; add A := ...",
-                    "other.st:5:6: JOIN: STruC++ wants each parameter in this call of a method; add A := ...",
-                    "other.st:6:12: Undeclared variable 'KNONE': the initial value of an input that this "
-                    "call leaves out; give the input"});
+  expect_told(end,
+              {"other.st:4:6: JOIN: STruC++ wants each parameter in this call of a method; add A := ...",
+               "other.st:4:27: MORE: STruC++ wants each parameter in this call of a method; add A := ...",
+               "other.st:5:6: JOIN: STruC++ wants each parameter in this call of a method; add A := ...",
+               "other.st:6:12: Undeclared variable 'KNONE': the initial value of an input that this "
+               "call leaves out; give the input"});
   EXPECT_THAT(end.output, Not(HasSubstr("other.st:7:")));
 }
 
 // A call of the type above would pass its arguments in another order.
 TEST_F(DifferencesOfStrucpp, AMethodWithOtherParametersThanTheOneThatItStandsForIsRefused) {
-  const ProgramEnd end = build(R"(INTERFACE Goes METHOD Go : INT VAR_INPUT x : INT; y : INT; END_VAR END_METHOD END_INTERFACE
+  const ProgramEnd end =
+      build(R"(INTERFACE Goes METHOD Go : INT VAR_INPUT x : INT; y : INT; END_VAR END_METHOD END_INTERFACE
 INTERFACE Walks EXTENDS Goes METHOD Walk : INT VAR_INPUT x : INT; END_VAR END_METHOD END_INTERFACE
 FUNCTION_BLOCK Base
 METHOD PUBLIC Go : INT VAR_INPUT y : INT; x : INT; END_VAR Go := x; END_METHOD
@@ -156,8 +159,9 @@ FUNCTION_BLOCK Other IMPLEMENTS Goes
 METHOD PUBLIC Go : INT VAR_INPUT x : INT; END_VAR VAR_IN_OUT y : INT; END_VAR Go := x; END_METHOD
 END_FUNCTION_BLOCK
 PROGRAM Prg VAR n : Next; END_VAR n(); END_PROGRAM
-CONFIGURATION k )" + kTask,
-                               "other", "strucpp");
+CONFIGURATION k )" +
+                kTask,
+            "other", "strucpp");
   EXPECT_FALSE(end.success());
   const auto told = [](const char* place, const char* method, const char* type) {
     return fmt::format("other.st:{}: {}: its parameters are not those of {},", place, method, type);
@@ -179,14 +183,15 @@ s := '$00';
 w := "$0041z$20AC"; w := "\$$"; w := "ä€😀'"; s := 'it''s$'\$$"'; s := '$C3$A4$N$l'; s := '$41$42 C';)");
   EXPECT_FALSE(end.success());
   const char* const takes_more = "it takes digits and letters behind a code for a part of that";
-  expect_told(end, {R"(other.st:3:26: STruC++ makes another text of "q$"q": write $0022 in the place of $")",
-                    "other.st:3:51: STruC++ ends the text '$C3$A4$00z' at the character $00",
-                    R"(other.st:4:6: STruC++ makes another text of "$$$"": write $0022 in the place of $")",
-                    R"(other.st:5:6: STruC++ makes another text of "it''s": it makes one ' of '')",
-                    R"(other.st:7:6: STruC++ makes another text of "$"a": it does not know $")",
-                    "other.st:9:6: STruC++ ends the text '$00' at the character $00",
-                    fmt::format(R"(other.st:6:6: STruC++ makes another text of "$0041B": {})", takes_more).c_str(),
-                    fmt::format("other.st:8:6: STruC++ makes another text of '$41B': {}", takes_more).c_str()});
+  expect_told(end,
+              {R"(other.st:3:26: STruC++ makes another text of "q$"q": write $0022 in the place of $")",
+               "other.st:3:51: STruC++ ends the text '$C3$A4$00z' at the character $00",
+               R"(other.st:4:6: STruC++ makes another text of "$$$"": write $0022 in the place of $")",
+               R"(other.st:5:6: STruC++ makes another text of "it''s": it makes one ' of '')",
+               R"(other.st:7:6: STruC++ makes another text of "$"a": it does not know $")",
+               "other.st:9:6: STruC++ ends the text '$00' at the character $00",
+               fmt::format(R"(other.st:6:6: STruC++ makes another text of "$0041B": {})", takes_more).c_str(),
+               fmt::format("other.st:8:6: STruC++ makes another text of '$41B': {}", takes_more).c_str()});
   EXPECT_THAT(end.output, Not(HasSubstr("other.st:10:")));
 }
 
