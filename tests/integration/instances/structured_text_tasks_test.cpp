@@ -145,7 +145,7 @@ END_RESOURCE END_CONFIGURATION
   EXPECT_EQ(sut->runtime().scheduler.view(), "CmpScheduleTimer");
 }
 
-// The edge is that of the area. As long as the slow task may be in its cycle, the flag is a value within
+// The edge is that of the area. As long as the idle task may be in its cycle, the flag is a value within
 // that.
 TEST_P(TextWithATaskFile, PutsOutTheMemoryOfATaskThatWasStoppedInItsCycle) {
   constexpr const char* kStopped = R"(
@@ -157,15 +157,15 @@ PROGRAM Fast VAR_EXTERNAL flag : BOOL; END_VAR VAR twice AT %QW1 : INT; END_VAR
 END_PROGRAM
 PROGRAM Edge VAR edges AT %QB4 : USINT; END_VAR edges := edges + 1; END_PROGRAM
 CONFIGURATION cell VAR_GLOBAL flag AT %MX0.0 : BOOL; END_VAR RESOURCE press ON PLC
-  TASK fast (INTERVAL := T#1ms, PRIORITY := 1);
-  TASK slow (INTERVAL := T#5ms, PRIORITY := 5);
-  TASK edge (SINGLE := flag, PRIORITY := 0);
-  PROGRAM one WITH fast : Fast;
-  PROGRAM two WITH slow : Slow;
-  PROGRAM three WITH edge : Edge;
+  TASK quick (INTERVAL := T#1ms, PRIORITY := 1);
+  TASK idle (INTERVAL := T#5ms, PRIORITY := 5);
+  TASK rise (SINGLE := flag, PRIORITY := 0);
+  PROGRAM one WITH quick : Fast;
+  PROGRAM two WITH idle : Slow;
+  PROGRAM three WITH rise : Edge;
 END_RESOURCE END_CONFIGURATION
 )";
-  (void)sandbox.write("twice.toml", "[task.slow]\nwatchdog_policy = 'task'\n");
+  (void)sandbox.write("twice.toml", "[task.idle]\nwatchdog_policy = 'task'\n");
   const ProgramEnd built = build(kStopped);
   ASSERT_TRUE(built.success()) << built.output;
   start(so("twice"));
