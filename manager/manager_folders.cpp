@@ -1,12 +1,16 @@
 // The rights to the folders and files of a host: those of the Manager, of instances and of the API server.
 
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "api/control/application_versions.hpp"
@@ -25,17 +29,55 @@ namespace {
 
 constexpr Duration kStateLimit = std::chrono::seconds(2);
 
+std::vector<std::string> state_folders(const HostConfig& host) {
+  return {host.state_directory, wishes_folder(host.state_directory, host.name),
+          applications_folder(host.state_directory, host.name),
+          exceptions_folder(host.state_directory, host.name), audit_folder(host)};
+}
+
+// That could start with it. Nothing: no other one than root.
+std::optional<uid_t> other_owner(const std::string& folder) {
+  struct stat status{};
+  const bool is_known = ::stat(folder.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) == 0;
+  return is_known && status.st_uid != 0 ? std::optional(status.st_uid) : std::nullopt;
+}
+
+// A text: why nothing can be kept in it. Empty: it is a folder, or there is none yet.
+std::string why_no_folder(const std::string& path) {
+  struct stat status{};
+  if (::stat(path.c_str(), &status) == 0)
+    return S_ISDIR(status.st_mode) ? "" : fmt::format("{} is not a folder", path);
+  const int error = errno;
+  if (error != ENOENT) return fmt::format("{} cannot be used: {}", path, std::strerror(error));
+  const bool is_link = ::lstat(path.c_str(), &status) == 0;
+  return is_link ? fmt::format("{} is a link to something that is not there", path) : "";
+}
+
 }  // namespace
 
 // Applications in them are run, and wishes followed.
 Result<void> check_state_folders(const HostConfig& host) {
-  const std::vector<std::string> folders{host.state_directory, wishes_folder(host.state_directory, host.name),
-                                         applications_folder(host.state_directory, host.name),
-                                         exceptions_folder(host.state_directory, host.name),
-                                         audit_folder(host)};
-  for (const std::string& folder : folders) {
+  for (const std::string& folder : state_folders(host)) {
     auto ours = check_own_folder(folder);
-    if (!ours && ours.error().code == ErrorCode::refused) return ours;
+    if (ours || ours.error().code != ErrorCode::refused) continue;
+    if (const auto owner = other_owner(folder)) {
+      ours.error().message += fmt::format(
+          ". This is about a start by user {}; if user {} is to start the manager, check as that one",
+          ::geteuid(), *owner);
+    }
+    return ours;
+  }
+  return {};
+}
+
+Result<void> check_state_is_kept(const HostConfig& host) {
+  for (const std::string& folder : state_folders(host)) {
+    if (const std::string why = why_no_folder(folder); !why.empty()) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{}: a start would run, and keep nothing there; mend that, or name another "
+                                 "folder",
+                                 why));
+    }
   }
   return {};
 }

@@ -28,6 +28,9 @@ void hand_over_ledger(const std::string& pool, const std::optional<UserAccount>&
 /// Whether check_own_folder() believes in the state directory of a host and in its own folders there, as far
 /// as they are there. refused: the first that it does not believe in.
 [[nodiscard]] Result<void> check_state_folders(const HostConfig& host);
+/// Whether something can be kept in them: none is a plain file, or a link to nothing. The manager starts
+/// without, and complains.
+[[nodiscard]] Result<void> check_state_is_kept(const HostConfig& host);
 
 /// Takes all rights to a folder from all other users. Makes it if it is not there; the folder above must be.
 [[nodiscard]] Result<void> keep_folder(const std::string& path);

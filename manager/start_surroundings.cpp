@@ -75,7 +75,10 @@ ConfigSurroundings start_surroundings(const std::string& programs) {
   const std::string plc_instance = programs + "/plc-instance";
   ConfigSurroundings surroundings = config_surroundings();
   surroundings.check_directories = true;
-  surroundings.check_state = check_state_folders;
+  surroundings.check_state = [](const HostConfig& host) -> Result<void> {
+    PLCHOST_TRY(check_state_folders(host));
+    return check_state_is_kept(host);
+  };
   surroundings.interfaces = network_interfaces();
   surroundings.check_application = [plc_instance](const HostConfig& host, const InstanceConfig& instance) {
     return try_application(plc_instance, host, instance);

@@ -60,7 +60,7 @@ constexpr std::array kHostKeys = {
              "folder of retain and persistent variables, wanted states of the instances "
              "(`wishes.HOST`, of one manager at a time), audit log (`audit.HOST`) and sent "
              "applications (`applications.HOST`). The manager makes it if it is not there, and refuses one "
-             "that other users can write"}),
+             "of another user, or that everybody can write"}),
     host<&HostConfig::application_limit_mib, NumberKey<1, kMaxApplicationMib>>(
         {.name = "application_limit_mib",
          .when = new_server,

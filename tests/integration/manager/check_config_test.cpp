@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/own_name.hpp"
@@ -98,6 +99,45 @@ TEST_F(CheckConfig, KnowsWhoseTheFoldersOfTheHostAre) {
     std::filesystem::remove(folder);
   }
   EXPECT_EQ(check(""), "cell.toml: ok, 0 instances\nexit 0\n");
+}
+
+// A start runs with each of them, keeps nothing, and says so.
+TEST_F(CheckConfig, FindsWhatIsNoFolderOfTheHost) {
+  namespace fs = std::filesystem;
+  const auto state = folder_ / "state";
+  const auto expect = [&](const fs::path& path, const std::string& why) {
+    EXPECT_EQ(check(""),
+              fmt::format("cell.toml:4: [host] state_directory: {} {}: a start would run, and keep "
+                          "nothing there; mend that, or name another folder\nexit 1\n",
+                          path.native(), why));
+    fs::remove(path);
+  };
+  write("state", "");
+  EXPECT_THAT(check(""), HasSubstr("[host] state_directory: " + state.native() + " is not a folder\nexit 1"));
+  fs::remove(state);
+  fs::create_symlink("state", state);
+  expect(state, "cannot be used: Too many levels of symbolic links");
+  fs::create_symlink("nothing", state);
+  expect(state, "is a link to something that is not there");
+  for (const char* const kind : {"wishes.cell1", "audit.cell1", "applications.cell1", "exceptions.cell1"}) {
+    fs::create_directory(state);
+    write(std::string("state/") + kind, "");
+    expect(state / kind, "is not a folder");
+    fs::create_symlink("nothing", state / kind);
+    expect(state / kind, "is a link to something that is not there");
+    fs::remove(state);
+  }
+  EXPECT_EQ(check(""), "cell.toml: ok, 0 instances\nexit 0\n");
+}
+
+// The one that checks is not always the one that starts.
+TEST_F(CheckConfig, SaysWhoseStartItIsAbout) {
+  constexpr uid_t kNobody = 65534;
+  const auto state = folder_ / "state";
+  std::filesystem::create_directory(state);
+  if (::chown(state.c_str(), kNobody, kNobody) != 0) return;  // only root can give it away
+  EXPECT_THAT(check(""), HasSubstr("This is about a start by user 0; if user 65534 is to start the manager, "
+                                   "check as that one\nexit 1"));
 }
 
 }  // namespace
