@@ -110,5 +110,6 @@ power_cuts() {
     step=$(events) && step=${step##* }
     [ $((cut % 10)) -ne 0 ] || echo "  $cut cuts, $step steps of the operator"
   done
+  plcctl start instance line2 >"$log" 2>&1 || fail "line2 does not start"
   [ "$step" -ge "$1" ] || fail "in $1 cuts the operator has done $step steps"
 }

@@ -43,24 +43,29 @@ OutputView::OutputView(std::vector<std::byte> initial, Writes writes, OutputImag
 OutputView::OutputView(std::vector<std::byte> initial, Writes writes, OutputRegisters& registers)
     : bytes_(std::move(initial)), base_(bytes_), writes_(std::move(writes)), registers_(&registers) {}
 
-// All but its own bytes, of which it knows more than anybody.
+// All but its own bytes, of which it knows more than anybody, and changes that are not out yet. These are of
+// a cycle that was too late, or were written by an operator between the cycles.
 void OutputView::refresh() noexcept {
   if (!image_->read_latest(scratch_)) return;
   for (const ByteRange own : writes_.own) {
     std::memcpy(scratch_.data() + own.offset, bytes_.data() + own.offset, own.bytes);
   }
+  for (const ByteRange shared : writes_.shared) {
+    const bool has_changes =
+        std::memcmp(bytes_.data() + shared.offset, base_.data() + shared.offset, shared.bytes) != 0;
+    for (std::size_t at = shared.offset; has_changes && at < shared.offset + shared.bytes; ++at) {
+      const std::byte latest = scratch_[at];
+      if (bytes_[at] != base_[at]) scratch_[at] = bytes_[at];
+      base_[at] = latest;
+    }
+    if (!has_changes) std::ranges::copy(part(scratch_, shared), part(base_, shared).begin());
+  }
   std::memcpy(bytes_.data(), scratch_.data(), bytes_.size());
 }
 
+// Registers cannot be read back: there each task knows its own changes only.
 void OutputView::begin_cycle() noexcept {
-  // In registers a value that an operator has written between the cycles is a change.
-  if (writes_.sole || registers_ != nullptr) return;
-  // A value that is not out yet is still a change.
-  if (late_) return;
-  if (image_ != nullptr) refresh();
-  for (const ByteRange shared : writes_.shared) {
-    std::memcpy(base_.data() + shared.offset, bytes_.data() + shared.offset, shared.bytes);
-  }
+  if (!writes_.sole && image_ != nullptr) refresh();
 }
 
 void OutputView::lay_over(std::span<std::byte> target) const noexcept {
@@ -82,8 +87,10 @@ void OutputView::end_cycle() noexcept {
   if (writes_.sole) {
     image_->write(bytes_);
   } else {
-    late_ = !image_->merge(scratch_, [this](std::span<std::byte> target) { lay_over(target); });
-    if (late_) return missed_.store(missed() + 1, std::memory_order_relaxed);
+    const bool is_out = image_->merge(scratch_, [this](std::span<std::byte> target) { lay_over(target); });
+    if (!is_out) return missed_.store(missed() + 1, std::memory_order_relaxed);
+    for (const ByteRange shared : writes_.shared)
+      std::ranges::copy(part(bytes_, shared), part(base_, shared).begin());
   }
   image_->published();
 }

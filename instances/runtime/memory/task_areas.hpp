@@ -74,14 +74,13 @@ class OutputView {
   void lay_over(std::span<std::byte> target) const noexcept;
 
   std::vector<std::byte> bytes_;
-  std::vector<std::byte> base_;  // bytes_ at the start of the cycle; of registers at the end of the last one
+  std::vector<std::byte> base_;  // bytes_ as others have them: where these differ, they are changes
   std::vector<std::byte> scratch_;
   Writes writes_;
   OutputImage* image_ = nullptr;
   OutputRegisters* registers_ = nullptr;
   std::atomic<bool> armed_{false};
   std::atomic<bool> given_up_{false};
-  bool late_ = false;                     // the last cycle's are not out yet
   std::atomic<std::uint64_t> missed_{0};  // written by the task alone
 };
 

@@ -104,6 +104,24 @@ TEST_F(SafeOutputsOfAreas, DoNotHideAChangeToTheSafeValue) {
   EXPECT_EQ(shown()[2], 7U) << "it goes on from its own value";
 }
 
+// As an operator does. The image of the other task would take it back.
+TEST_F(SafeOutputsOfAreas, ShowAValueThatIsWrittenBetweenTwoCycles) {
+  set_up("Zero");
+  sut.outputs().arm();
+  run(0, 10);
+  run(1, 20);
+  EXPECT_EQ(shown(), (Words{10, 21, 12}));
+  words(two)[2] = 99;
+  run(1, 30);
+  EXPECT_EQ(shown(), (Words{10, 31, 99}));
+  words(two)[2] = 98;
+  run(0, 40);
+  run(1, 50);
+  EXPECT_EQ(shown(), (Words{40, 51, 98})) << "its write comes after the change of the other task";
+  run(1, 60);
+  EXPECT_EQ(shown(), (Words{40, 61, 98}));
+}
+
 TEST_F(SafeOutputsOfAreas, OfAProcessThatWasForkedAreNotToldOf) {
   set_up("Zero");
   sut.outputs().arm();
