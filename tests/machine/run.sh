@@ -78,9 +78,7 @@ if [ ! -e "$root/made" ]; then
   .ci/debian_root "$suite" "$root" "$machine_packages" >"$log" 2>&1 || cannot "$(tail -n 1 "$log")"
   touch "$root/made"
 fi
-rm -f "$root/etc/resolv.conf"
-cp /etc/resolv.conf "$root/etc/"
-cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/"
+.ci/apt_settings "$root"
 needed=$(for package in "$packages"/*.deb; do dpkg-deb -f "$package" Depends | tr ',' '\n' | sed 's/^ *//' | grep -vE '^(libplc|plchost)'; done |
   sort -u | paste -sd,)
 [ "$kernel" != linux-image-rt-amd64 ] || needed+=,grub2-common
