@@ -103,9 +103,14 @@ function(plchost_manual program what)
     return()
   endif()
   set(folder ${CMAKE_BINARY_DIR}/share/man/man8)
+  # help2man starts what it is given by a shell. An emulator is used as CMake uses it: for another processor only.
+  set(started $<TARGET_FILE:${program}>)
+  if(CMAKE_CROSSCOMPILING AND CMAKE_CROSSCOMPILING_EMULATOR)
+    string(JOIN " " started ${CMAKE_CROSSCOMPILING_EMULATOR} ${started})
+  endif()
   add_custom_command(TARGET ${program} POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
     COMMAND ${HELP2MAN} --no-info --section 8 --source plchost --name ${what} --output ${folder}/${program}.8
-            $<TARGET_FILE:${program}> VERBATIM)
+            ${started} VERBATIM)
 endfunction()
 
 # A control program: a shared object that plc-instance loads. Unique symbols would survive dlclose
