@@ -43,7 +43,7 @@ void FlightRecording::add(const TraceListing& listing) {
     if (ring == nullptr) {
       damaged_ += told.entries.size();
     } else if (first) {
-      ring->next = told.first + told.entries.size();
+      ring->next_ = told.first + told.entries.size();
     } else {
       add(*ring, told, listing.time_monotonic_ns);
     }
@@ -52,7 +52,7 @@ void FlightRecording::add(const TraceListing& listing) {
 
 void FlightRecording::begin_process(std::int32_t pid) {
   for (RecordedRing& ring : rings_) {
-    ring.next = 0;
+    ring.next_ = 0;
     gap_here(ring).process = pid;
   }
 }
@@ -69,10 +69,10 @@ RecordedRing* FlightRecording::ring_of(const TraceRing& told) {
     if (rings_.size() == kMostRecordedRings) return nullptr;
     ring = rings_.emplace(ring);
     ring->task = std::move(task);
-  } else if (ring->page == pages_) {
+  } else if (ring->page_ == pages_) {
     return nullptr;  // twice in one page
   }
-  ring->page = pages_;
+  ring->page_ = pages_;
   ring->ring = told.ring;
   ring->iec_priority = told.iec_priority;
   ring->event_mark = told.event_mark;
@@ -85,12 +85,12 @@ void FlightRecording::add(RecordedRing& ring, const TraceRing& told, std::int64_
     damaged_ += count;
     return;
   }
-  if (count == 0 || told.first + count <= ring.next) return;  // all of it was seen
-  if (told.first > ring.next) {
-    gap_here(ring).missing += told.first - ring.next;
-    missing_ += told.first - ring.next;
+  if (count == 0 || told.first + count <= ring.next_) return;  // all of it was seen
+  if (told.first > ring.next_) {
+    gap_here(ring).missing += told.first - ring.next_;
+    missing_ += told.first - ring.next_;
   }
-  const std::uint64_t seen = ring.next > told.first ? ring.next - told.first : 0;
+  const std::uint64_t seen = ring.next_ > told.first ? ring.next_ - told.first : 0;
   for (std::uint64_t i = seen; i < count; ++i) {
     const FlightEntry& entry = told.entries[i];
     const bool possible =
@@ -98,7 +98,7 @@ void FlightRecording::add(RecordedRing& ring, const TraceRing& told, std::int64_
     if (possible) ring.entries.push_back(entry);
     (possible ? entries_ : damaged_) += 1;
   }
-  ring.next = told.first + count;
+  ring.next_ = told.first + count;
 }
 
 }  // namespace plchost

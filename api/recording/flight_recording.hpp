@@ -28,8 +28,8 @@ struct RecordedRing {
 
  private:
   friend class FlightRecording;
-  std::uint64_t next = 0;  // number of the entry that comes next
-  std::uint64_t page = 0;  // the last one that had the ring
+  std::uint64_t next_ = 0;  // number of the entry that comes next
+  std::uint64_t page_ = 0;  // the last one that had the ring
 };
 
 /// The entries of the flight recorder of an instance, put together of pages that overlap. A host may be any
