@@ -7,6 +7,7 @@
 
 #include <curses.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include "shm/base/names.hpp"
@@ -139,8 +140,16 @@ void TopScreen::draw(std::span<const TopLine> lines) {
 
 std::optional<TopKey> TopScreen::key(Duration patience) {
   using Milliseconds = std::chrono::duration<int, std::milli>;
-  timeout(std::chrono::duration_cast<Milliseconds>(patience).count());
-  const int code = getch();
+  timeout(0);
+  int code = getch();
+  if (code == ERR) {
+    // A terminal that is gone answers at once, which getch() does not tell from no key.
+    pollfd input{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
+    ::poll(&input, 1, std::chrono::duration_cast<Milliseconds>(patience).count());
+    constexpr unsigned kGone = POLLHUP | POLLERR | POLLNVAL;
+    is_gone_ = is_gone_ || (static_cast<unsigned>(input.revents) & kGone) != 0;
+    code = getch();
+  }
   return code == ERR ? std::nullopt : key_of(code);
 }
 

@@ -25,11 +25,14 @@ class TopScreen {
   void draw(std::span<const TopLine> lines);
   /// Waits for a key for so long. Nothing: none came, or the terminal has another size now.
   [[nodiscard]] std::optional<TopKey> key(Duration patience);
+  /// Its other end was closed: no key will come any more.
+  [[nodiscard]] bool is_gone() const noexcept { return is_gone_; }
 
  private:
   struct Terminal;
   explicit TopScreen(std::unique_ptr<Terminal> terminal) noexcept;
   std::unique_ptr<Terminal> terminal_;
+  bool is_gone_ = false;
 };
 
 }  // namespace plchost

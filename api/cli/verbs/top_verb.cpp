@@ -31,7 +31,7 @@ class Top {
         every_(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(every_s))) {}
 
   void run() {
-    while (!view_.ended() && !interrupted()) {
+    while (!view_.ended() && !screen_.is_gone() && !interrupted()) {
       const TimePoint now = MonotonicClock::now();
       if (now >= next_ && !view_.paused()) look(now);
       client_.wait_for_change(MonotonicClock::now());  // takes what has come, for the command, too

@@ -88,4 +88,11 @@ press q
 see 'ended with 0'
 "$BIN/plcctl" top </dev/null >"$cell/out" 2>&1 && fail "top without a terminal"
 grep -q 'needs a terminal' "$cell/out" || fail "$(cat "$cell/out")"
+
+echo "- a terminal that is closed ends it, also if it does not hear of that by a signal"
+terminal new-window "trap '' HUP; TERM=tmux-256color exec '$BIN/plcctl' --timeout 10 top"
+see '2 instances'
+top=$(terminal display-message -p '#{pane_pid}')
 end_terminal
+has_ended() { ! kill -0 "$top" 2>/dev/null; }
+until_true 20 has_ended
