@@ -93,6 +93,7 @@ echo "- a terminal that is closed ends it, also if it does not hear of that by a
 terminal new-window "trap '' HUP; TERM=tmux-256color exec '$BIN/plcctl' --timeout 10 top"
 see '2 instances'
 top=$(terminal display-message -p '#{pane_pid}')
+others+=("$top")
 end_terminal
 has_ended() { ! kill -0 "$top" 2>/dev/null; }
 until_true 20 has_ended
