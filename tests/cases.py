@@ -2,7 +2,7 @@
 """Runs the cases of one test program in as few processes as possible, and names each case that fails.
 
 Usage: cases.py [--share I/N] [--limit SECONDS] [--results FILE] [--retries FILE] [--skips FILE] [--without PATTERNS] [--kind KIND]
-                PROGRAM
+                [--emulator EMULATOR] PROGRAM
 
 One process runs one case after the other. If a case ends the process or exceeds the limit, the case is named, and the
 next process continues with the case after it. If a process fails although none of its cases did (a leak), each of them
@@ -13,7 +13,8 @@ runs again in a process of its own. A process that a case leaves running is a fa
 --retries  the tests that may run a second time if they fail (tests/retries.txt). Stalls of the machine are read from $PLCHOST_STALLS
 --skips    a list of tests (tests/skips.txt). A case is skipped without being run if its reason there begins with "not run:"
 --without  cases that run elsewhere, names with * and ?, separated by colons
---kind     of the build, for these lists: plain, address, thread or threads
+--kind     of the build, for these lists: plain, address, thread, threads or emulated
+--emulator starts a program that is for another processor
 """
 
 import argparse
@@ -41,10 +42,14 @@ PR_SET_PDEATHSIG = 1
 OF_CASES = {**os.environ, "ASAN_OPTIONS": os.environ.get("ASAN_OPTIONS", "") + ":detect_stack_use_after_return=1"}
 
 
-def list_cases(program):
+def started(program, emulator):
+    return [emulator, program] if emulator else [program]
+
+
+def list_cases(program, emulator=""):
     cases, suite = [], ""
     # A program that is slow to start is one that hangs.
-    said = subprocess.run([program, "--gtest_list_tests"], check=True, capture_output=True, text=True, timeout=120)
+    said = subprocess.run([*started(program, emulator), "--gtest_list_tests"], check=True, capture_output=True, text=True, timeout=120)
     for line in said.stdout.splitlines():
         name = line.split("#")[0].rstrip()
         if name.startswith("  "):
@@ -86,7 +91,7 @@ class Result(typing.NamedTuple):
 class Run:
     """One process, and what it has said about its cases."""
 
-    def __init__(self, program, cases, limit):
+    def __init__(self, command, cases, limit):
         self.cases, self.limit = cases, limit
         self.results = {}
         self.current, self.began = None, time.monotonic()
@@ -96,7 +101,7 @@ class Run:
             flags.write("--gtest_filter=" + ":".join(cases) + "\n")
             flags.flush()
             self.process = subprocess.Popen(
-                [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"], env=OF_CASES,
+                [*command, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"], env=OF_CASES,
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=functools.partial(follow, os.getpid()))
             try:
                 self.watch()
@@ -175,14 +180,14 @@ class Run:
 
 
 class Share:
-    def __init__(self, program, limit):
-        self.program, self.limit = program, limit
+    def __init__(self, command, limit):
+        self.command, self.limit = command, limit
         self.results = {}
 
     def run(self, cases):
         left = list(cases)
         while left:
-            run = Run(self.program, left, self.limit)
+            run = Run(self.command, left, self.limit)
             self.results.update(run.results)
             if run.trouble and run.current:
                 print(f"FAILED: {run.current} {run.trouble}")
@@ -197,7 +202,7 @@ class Share:
     def find_the_guilty(self, cases, run):
         guilty = False
         for case in cases:
-            alone = Run(self.program, [case], self.limit)
+            alone = Run(self.command, [case], self.limit)
             self.results[case] = alone.results.get(case, Result("failed", 0, 0, ""))
             if alone.trouble:
                 guilty = True
@@ -226,16 +231,18 @@ def main():
     parser.add_argument("--skips")
     parser.add_argument("--without", default="")
     parser.add_argument("--kind", default="plain")
+    parser.add_argument("--emulator", default="")
     parser.add_argument("program")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
 
     share, of = map(int, options.share.split("/"))
     elsewhere = options.without.split(":")
-    cases = [case for case in list_cases(options.program) if not any(fnmatch.fnmatchcase(case, pattern) for pattern in elsewhere)][share::of]
+    cases = [case for case in list_cases(options.program, options.emulator) if not any(fnmatch.fnmatchcase(case, pattern) for pattern in elsewhere)][share::of]
     skips = Expected(options.skips, options.kind)
     left_out = {case: skips.reason(case, "not run:") for case in cases if skips.reason(case, "not run:")}
-    work = Share(options.program, options.limit)
+    command = started(options.program, options.emulator)
+    work = Share(command, options.limit)
     work.run([case for case in cases if case not in left_out])
     work.results.update({case: Result("skipped", 0, 0, reason) for case, reason in left_out.items()})
 
@@ -246,7 +253,7 @@ def main():
         if not (retries.second_run(case) or (case in stalled and len(stalled) <= STALLED)):
             continue
         print(f"again: {case}{f', as the machine stood still for {milliseconds(stalled[case])}' if case in stalled else ''}\n{work.results[case].output}")
-        second = Share(options.program, options.limit)
+        second = Share(command, options.limit)
         second.run([case])
         if second.results[case].word == "passed":
             work.results[case] = second.results[case]._replace(word="retried")

@@ -3,12 +3,13 @@
 import fnmatch
 
 # Each kind of line is held against one kind of build, which has all tests that such lines name.
-HELD_BY = {"any": "plain", "plain": "plain", "sanitized": "address", "address": "address", "thread": "thread", "threads": "threads"}
+HELD_BY = {"any": "plain", "plain": "plain", "sanitized": "address", "address": "address", "thread": "thread", "threads": "threads",
+           "emulated": "emulated"}
 LEFT_OUT = "left out:"  # begins the reason of what a build does not have
 
 
 class Expected:
-    """Each line: KIND PATTERN REASON. KIND: any, plain, sanitized, address, thread or threads. PATTERN: a name with * and ?."""
+    """Each line: KIND PATTERN REASON. KIND: any, plain, sanitized, address, thread, threads or emulated. PATTERN: a name with * and ?."""
 
     def __init__(self, path, kind="any"):
         kinds = {"any", kind} | ({"sanitized"} if kind in ("address", "thread", "threads") else set()) | ({"thread"} if kind == "threads" else set())

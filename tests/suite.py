@@ -13,6 +13,7 @@ long the machine stood still.
 
 import argparse
 import fnmatch
+import itertools
 import json
 import pathlib
 import re
@@ -38,7 +39,15 @@ SLOW = 3  # second runs in a build whose programs are all slow
 HERE = pathlib.Path(__file__).resolve().parent
 
 
+def emulator_of(build):
+    """The program that starts those of this build; empty: they are for this processor."""
+    found = re.search(r"^CMAKE_CROSSCOMPILING_EMULATOR:\w+=(.*)$", (build / "CMakeCache.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    return found.group(1) if found else ""
+
+
 def kind_of(build):
+    if emulator_of(build):
+        return "emulated"
     cache = (build / "CMakeCache.txt").read_text(encoding="utf-8")
     found = re.search(r"^SANITIZER:\w+=(.*)$", cache, re.MULTILINE)
     threads = "threads" if re.search(r"^PLCHOST_ALL_THREADS:\w+=ON$", cache, re.MULTILINE) else "thread"
@@ -119,13 +128,14 @@ class Suite:
             for program in PROGRAM.findall(file.read_text(encoding="utf-8")):
                 programs[program] = []
         for _, command in self.listed([]):
-            for case in (word.removeprefix(ONE_CASE) for word in command if word.startswith(ONE_CASE)):
-                if not set(case) & set("*?:"):
-                    programs.setdefault(command[0], []).append(case)
+            for before, word in itertools.pairwise(command):  # an emulator may stand before the program
+                case = word.removeprefix(ONE_CASE)
+                if word.startswith(ONE_CASE) and not set(case) & set("*?:"):
+                    programs.setdefault(before, []).append(case)
         wrong = []
         for program, cases in programs.items():
             try:
-                there = set(list_cases(program))
+                there = set(list_cases(program, emulator_of(self.build)))
             except (OSError, subprocess.SubprocessError) as error:
                 wrong.append(f"{program} ({error})")
                 continue
