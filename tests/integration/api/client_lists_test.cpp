@@ -28,7 +28,8 @@ TEST_F(ClientLists, HasAllOperationsOfTheContract) {
   std::set<std::string> known{
       "check host",     "list objects", "list nodes",  // functions of their own
       "list routes",    "read clock",   "read log",   "download application",
-      "list variables", "read debug"};  // of plcctl debug alone: see instances/debugging.md
+      "list variables", "read debug",  // of plcctl debug alone: see instances/debugging.md
+      "read trace"};                   // of plcctl record trace alone
   for (const auto& operation : Client::operations()) known.insert(operation.name);
   for (const Operation& operation : operations()) {
     if (operation.place == OperationPlace::internal) continue;

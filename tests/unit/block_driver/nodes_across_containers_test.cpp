@@ -2,12 +2,15 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <string>
 #include <thread>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "shm/block_driver/node_locks.hpp"
@@ -113,21 +116,29 @@ TEST_F(NodesAcrossContainers, BlocksComeFromThereAndTheEndIsSeenInTheNextTick) {
 
 TEST_F(NodesAcrossContainers, ChildOfForkDoesNotKeepTheNodeOfItsParent) {
   const NodeLife life = sut_.join({.name = "held"}).value();
+  ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // the child of a child is waited for here
   const pid_t parent = ::fork();
   if (parent == 0) {
     NodeDirectory own = NodeDirectory::open(pool()).value();
     const bool joined = own.join({.name = "parent", .forced_address = 5}).has_value();
-    if (::fork() == 0) {
+    const pid_t child = ::fork();
+    if (child == 0) {
       ::alarm(20);
       ::pause();
     }
+    step_ = child;
     ::_exit(joined ? 0 : 1);
   }
   int status = -1;
   ::waitpid(parent, &status, 0);
-  ASSERT_EQ(status, 0);
+  EXPECT_EQ(status, 0);
   EXPECT_EQ(sut_.reclaim(), 1U) << "the child of that process still runs";
   EXPECT_TRUE(sut_.record(life.node));
+  const pid_t child = step_;
+  ASSERT_GT(child, 0);
+  ::kill(child, SIGKILL);
+  EXPECT_EQ(::waitpid(child, &status, 0), child);
+  ::prctl(PR_SET_CHILD_SUBREAPER, 0);
 }
 
 TEST_F(NodesAcrossContainers, ProgramThatClosesTheLocksGetsThemAgain) {
