@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMostLosses = 8;
 
-constexpr std::string_view kKeys[] = {
+constexpr std::string_view kTopKeys[] = {
     "1 2 3 Tab     instances, tasks, cores",
     "Up Down j k   choose a row; Page Up, Page Down, Home, End",
     "Enter         look into an instance: its tasks, last losses and exception",
@@ -27,14 +27,14 @@ constexpr std::string_view kKeys[] = {
     "q             end",
 };
 
-std::vector<std::string> lines_of(const std::string& text) {
+std::vector<std::string> table_lines(const std::string& text) {
   std::vector<std::string> lines;
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) lines.push_back(std::move(line));
   return lines;
 }
 
-TopLine::Look look_of(const Row& row) {
+TopLine::Look row_look(const Row& row) {
   const auto state = row.find("state");
   const std::string word = state != row.end() && state->is_string() ? state->get<std::string>() : "";
   if (word == "exception" || word == "failed" || word == "silent") return TopLine::Look::bad;
@@ -101,7 +101,8 @@ void TopView::draw_rows(std::vector<TopLine>& lines, std::size_t width, std::siz
     lines.push_back({.text = hosts_.empty() ? "no host answers" : "nothing to show"});
     return;
   }
-  const auto table = lines_of(format_table(shown_.rows, shown_.columns, {.coloured = false, .width = width}));
+  const auto table =
+      table_lines(format_table(shown_.rows, shown_.columns, {.coloured = false, .width = width}));
   if (table.empty() || height < 2) return;
   lines.push_back({.text = table.front() + std::string(width, ' '), .look = TopLine::Look::header});
   const std::size_t room = height - 1;
@@ -109,7 +110,7 @@ void TopView::draw_rows(std::vector<TopLine>& lines, std::size_t width, std::siz
   for (std::size_t i = first; i < shown_.rows.size() && i < first + room && i + 1 < table.size(); ++i) {
     const bool chosen = i == place_;
     lines.push_back({.text = chosen ? table[i + 1] + std::string(width, ' ') : table[i + 1],
-                     .look = chosen ? TopLine::Look::chosen : look_of(shown_.rows[i])});
+                     .look = chosen ? TopLine::Look::chosen : row_look(shown_.rows[i])});
   }
 }
 
@@ -124,7 +125,8 @@ void TopView::draw_losses(std::vector<TopLine>& lines, std::size_t width, std::s
     return;
   }
   losses.rows.resize(std::min({losses.rows.size(), kMostLosses, height > 3 ? height - 3 : 0}));
-  const auto table = lines_of(format_table(losses.rows, losses.columns, {.coloured = false, .width = width}));
+  const auto table =
+      table_lines(format_table(losses.rows, losses.columns, {.coloured = false, .width = width}));
   for (std::size_t i = 0; i < table.size(); ++i) {
     lines.push_back({.text = i == 0 ? table[i] + std::string(width, ' ') : table[i],
                      .look = i == 0 ? TopLine::Look::header : TopLine::Look::plain});
@@ -133,7 +135,7 @@ void TopView::draw_losses(std::vector<TopLine>& lines, std::size_t width, std::s
 
 void TopView::draw_help(std::vector<TopLine>& lines) const {
   lines.push_back({});
-  for (const std::string_view key : kKeys) lines.push_back({.text = std::string(key)});
+  for (const std::string_view key : kTopKeys) lines.push_back({.text = std::string(key)});
 }
 
 TopLine TopView::foot() const {

@@ -15,7 +15,7 @@ using dds::text_of;
 
 namespace {
 
-constexpr double kNsOfASecond = 1e9;
+constexpr double kNanosecondsOfASecond = 1e9;
 constexpr double kWholeCorePercent = 100;
 
 const LoadFigures& found_load(const std::map<std::string, LoadFigures>& loads, const std::string& name) {
@@ -81,8 +81,8 @@ void TopFigures::count(Counted& task, const plc_TaskStatus& status, TimePoint no
   const double seconds = std::chrono::duration<double>(now - cycles.back().first).count();
   const auto run = static_cast<double>(status.cycles - cycles.back().second);
   task.figures.cycles_per_s = seconds > 0 ? run / seconds : 0;
-  task.figures.load_percent =
-      task.figures.cycles_per_s * static_cast<double>(status.exec_avg_ns) / kNsOfASecond * kWholeCorePercent;
+  task.figures.load_percent = task.figures.cycles_per_s * static_cast<double>(status.exec_avg_ns) /
+                              kNanosecondsOfASecond * kWholeCorePercent;
 }
 
 void TopFigures::take(const std::vector<HostLook>& hosts, TimePoint now) {

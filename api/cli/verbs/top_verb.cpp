@@ -15,7 +15,7 @@ namespace plchost {
 
 namespace {
 
-constexpr Duration kLook = std::chrono::milliseconds(100);  // time that a look at all hosts may take
+constexpr Duration kPlantLook = std::chrono::milliseconds(100);  // time that a look at all hosts may take
 constexpr Duration kKeyPatience = std::chrono::milliseconds(50);
 constexpr std::size_t kTrendWidth = 20;
 
@@ -49,7 +49,7 @@ class Top {
  private:
   void look(TimePoint now) {
     if (auto hosts = session_.known_hosts()) {
-      plant_.take(*std::move(hosts), now + kLook);
+      plant_.take(*std::move(hosts), now + kPlantLook);
     } else {
       view_.say(printable(hosts.error().describe()));
     }
