@@ -39,7 +39,7 @@ TEST(OutputRegistersOfTwoTasks, EndWithTheLastChange) {
     const std::uint64_t since = restored;
     while (restored < since + 1) {
     }
-    wrong += __atomic_load_n(&registers[0], __ATOMIC_SEQ_CST) == byte ? 0U : 1U;
+    wrong += std::atomic_ref<std::byte>(registers[0]).load() == byte ? 0U : 1U;
   }
   ends = true;
   first.join();
