@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
