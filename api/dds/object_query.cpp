@@ -8,6 +8,7 @@
 
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/utf8.hpp"
 
 namespace plchost {
 
@@ -36,15 +37,11 @@ Result<void> check_query(const ObjectQuery& query) {
   return check_pattern(query.match);
 }
 
-bool continues_character(char c) noexcept {
-  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
-}
-
 // Where the next character of UTF-8 begins.
 std::size_t next_character(std::string_view text, std::size_t at) noexcept {
   do {
     ++at;
-  } while (at < text.size() && continues_character(text[at]));
+  } while (at < text.size() && continues_utf8(text[at]));
   return at;
 }
 

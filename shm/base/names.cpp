@@ -190,16 +190,12 @@ namespace {
 
 constexpr std::size_t kLongestCharacter = 4;
 
-bool is_within_character(char c) noexcept {
-  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
-}
-
 }  // namespace
 
 std::string_view cut(std::string_view text, std::size_t most) noexcept {
   if (text.size() <= most) return text;
   std::size_t end = most;
-  while (end > 0 && most - end < kLongestCharacter && is_within_character(text[end])) --end;
+  while (end > 0 && most - end < kLongestCharacter && continues_utf8(text[end])) --end;
   return text.substr(0, end);
 }
 
@@ -213,7 +209,7 @@ std::string_view cut_front(std::string_view text, std::size_t most) noexcept {
   if (text.size() <= most) return text;
   text.remove_prefix(text.size() - most);
   std::size_t torn = 0;
-  while (torn < std::min(text.size(), kLongestCharacter) && is_within_character(text[torn])) ++torn;
+  while (torn < std::min(text.size(), kLongestCharacter) && continues_utf8(text[torn])) ++torn;
   return text.substr(torn);
 }
 

@@ -15,4 +15,9 @@ struct Utf8Character {
 /// forms must be used, and halves of a pair of UTF-16 are no characters.
 [[nodiscard]] std::optional<Utf8Character> first_utf8(std::string_view text) noexcept;
 
+/// Whether it is one of the bytes behind the first one of a character.
+[[nodiscard]] constexpr bool continues_utf8(char byte) noexcept {
+  return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U;
+}
+
 }  // namespace plchost

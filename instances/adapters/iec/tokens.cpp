@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/utf8.hpp"
+
 namespace plchost::iec {
 
 namespace {
@@ -36,11 +38,6 @@ bool is_date(std::string_view type) noexcept {
   return std::ranges::any_of(kDates, [&](std::string_view date) { return same(date, type); });
 }
 
-// The bytes of UTF-8 behind the first one of a character.
-bool continues_character(char c) noexcept {
-  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
-}
-
 constexpr std::size_t kMostForeign = 20;  // problems; a file that is no text has no more
 
 class Reader {
@@ -68,7 +65,7 @@ class Reader {
       if (text_[position_++] == '\n') {
         ++place_.line;
         place_.column = 1;
-      } else if (!continues_character(text_[position_ - 1])) {
+      } else if (!continues_utf8(text_[position_ - 1])) {
         ++place_.column;
       }
     }
@@ -252,7 +249,7 @@ std::size_t byte_order_mark(std::string_view text) noexcept {
 }
 
 unsigned characters_in(std::string_view text) noexcept {
-  return static_cast<unsigned>(std::ranges::count_if(text, [](char c) { return !continues_character(c); }));
+  return static_cast<unsigned>(std::ranges::count_if(text, [](char c) { return !continues_utf8(c); }));
 }
 
 std::string folded(std::string_view name) {
