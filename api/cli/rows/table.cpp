@@ -6,6 +6,7 @@
 
 #include "api/recording/csv_text.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/utf8.hpp"
 
 namespace plchost {
 
@@ -36,8 +37,7 @@ bool is_number(const std::vector<Row>& rows, const char* field) {
 
 // In characters of UTF-8, which is what a terminal puts side by side.
 std::size_t width_of(const std::string& text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+  return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return !continues_utf8(c); }));
 }
 
 /// The colour of a state, as terminals number them; 0: that of all other text.
@@ -46,9 +46,16 @@ int colour_of(std::string_view field, std::string_view text) {
   constexpr int kGreen = 32;
   constexpr int kYellow = 33;
   if (field != "state" && field != "to") return 0;
-  if (text == "running" || text == "alive") return kGreen;
-  if (text == "exception" || text == "failed" || text == "silent") return kRed;
-  if (text == "safe_mode" || text == "waiting" || text == "starting" || text == "stopping") return kYellow;
+  switch (health_of(text)) {
+    case StateHealth::none:
+      return 0;
+    case StateHealth::well:
+      return kGreen;
+    case StateHealth::uncertain:
+      return kYellow;
+    case StateHealth::bad:
+      return kRed;
+  }
   return 0;
 }
 
@@ -118,8 +125,16 @@ std::string csv_field(const Row& value) {
 
 }  // namespace
 
-std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
-                         const TableStyle& style) {
+StateHealth health_of(std::string_view state) noexcept {
+  if (state == "running" || state == "alive") return StateHealth::well;
+  if (state == "exception" || state == "failed" || state == "silent") return StateHealth::bad;
+  if (state == "safe_mode" || state == "waiting" || state == "starting" || state == "stopping")
+    return StateHealth::uncertain;
+  return StateHealth::none;
+}
+
+std::vector<std::string> table_lines(const std::vector<Row>& rows, const std::vector<Column>& columns,
+                                     const TableStyle& style) {
   std::vector<PrintedColumn> printed;
   for (const Column& column : columns) printed.push_back(print_column(rows, column));
   if (style.width > 0) fit(printed, style.width);
@@ -134,8 +149,13 @@ std::string format_table(const std::vector<Row>& rows, const std::vector<Column>
       if (!last) lines[i] += "  ";
     }
   }
+  return lines;
+}
+
+std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
+                         const TableStyle& style) {
   std::string text;
-  for (const std::string& line : lines) text += line + "\n";
+  for (const std::string& line : table_lines(rows, columns, style)) text += line + "\n";
   return text;
 }
 

@@ -34,6 +34,16 @@ struct TableStyle {
   std::size_t width = 0;  ///< characters of the terminal; 0: the table is as wide as it is
 };
 
+/// How well that is which is in a state.
+enum class StateHealth : std::uint8_t { none, well, uncertain, bad };
+/// `state`: as a row says it. Of all other words: none.
+[[nodiscard]] StateHealth health_of(std::string_view state) noexcept;
+
+/// The lines of format_table(), the header first.
+[[nodiscard]] std::vector<std::string> table_lines(const std::vector<Row>& rows,
+                                                   const std::vector<Column>& columns,
+                                                   const TableStyle& style = {});
+
 /// An aligned table with a header line: texts to the left, numbers to the right. An empty text is shown as
 /// "-". Characters that could drive a terminal are shown as '?'.
 [[nodiscard]] std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,

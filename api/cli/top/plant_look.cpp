@@ -8,12 +8,17 @@
 
 namespace plchost {
 
+const HostLook* find_host(const std::vector<HostLook>& hosts, std::string_view name) noexcept {
+  const auto found =
+      std::ranges::find_if(hosts, [&](const HostLook& look) { return look.host.name == name; });
+  return found == hosts.end() ? nullptr : &*found;
+}
+
 void PlantLook::take(std::vector<HostView> hosts, TimePoint deadline) {
-  std::vector<HostLook> before = std::exchange(hosts_, {});
+  const std::vector<HostLook> before = std::exchange(hosts_, {});
   for (HostView& host : hosts) {
-    const auto old =
-        std::ranges::find(before, host.name, [](const HostLook& look) { return look.host.name; });
-    HostLook look = old == before.end() ? HostLook{} : std::move(*old);
+    const HostLook* const old = find_host(before, host.name);
+    HostLook look = old == nullptr ? HostLook{} : *old;
     look.host = std::move(host);
     const auto refresh = [&]<class Sample>(std::vector<Sample>& samples) {
       if (auto status = client_.status<Sample>(look.host.name, deadline)) samples = *std::move(status);
@@ -28,8 +33,8 @@ void PlantLook::take(std::vector<HostView> hosts, TimePoint deadline) {
 
 InstanceStatistics PlantLook::statistics(const std::string& host, const std::string& instance) {
   InstanceStatistics found{.host = host, .instance = instance, .tasks = {}};
-  const auto look = std::ranges::find(hosts_, host, [](const HostLook& one) { return one.host.name; });
-  if (look == hosts_.end()) return found;
+  const HostLook* const look = find_host(hosts_, host);
+  if (look == nullptr) return found;
   for (const plc_TaskStatus& task : look->tasks) {
     if (dds::text_of(task.instance) != instance) continue;
     if (auto report = client_.statistics(host, instance, dds::text_of(task.task), MonotonicClock::now())) {

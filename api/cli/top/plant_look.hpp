@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <control.h>
@@ -18,6 +19,9 @@ struct HostLook {
   std::vector<plc_LossStatus> losses;
   std::vector<plc_ExceptionStatus> exceptions;
 };
+
+/// Null: it was not seen.
+[[nodiscard]] const HostLook* find_host(const std::vector<HostLook>& hosts, std::string_view name) noexcept;
 
 /// The statistics of the tasks of one instance.
 struct InstanceStatistics {

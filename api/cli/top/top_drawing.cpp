@@ -1,13 +1,12 @@
 // How a TopView is drawn.
 #include <algorithm>
-#include <map>
-#include <sstream>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "api/cli/top/top_view.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/utf8.hpp"
 
 namespace plchost {
 
@@ -27,19 +26,18 @@ constexpr std::string_view kTopKeys[] = {
     "q             end",
 };
 
-std::vector<std::string> table_lines(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(std::move(line));
-  return lines;
-}
-
 TopLine::Look row_look(const Row& row) {
   const auto state = row.find("state");
-  const std::string word = state != row.end() && state->is_string() ? state->get<std::string>() : "";
-  if (word == "exception" || word == "failed" || word == "silent") return TopLine::Look::bad;
-  if (word == "safe_mode" || word == "waiting" || word == "starting" || word == "stopping")
-    return TopLine::Look::warning;
+  const bool has_one = state != row.end() && state->is_string();
+  switch (health_of(has_one ? state->get_ref<const std::string&>() : "")) {
+    case StateHealth::bad:
+      return TopLine::Look::bad;
+    case StateHealth::uncertain:
+      return TopLine::Look::warning;
+    case StateHealth::none:
+    case StateHealth::well:
+      break;
+  }
   return TopLine::Look::plain;
 }
 
@@ -48,7 +46,7 @@ TopLine::Look row_look(const Row& row) {
 std::string cut_to(std::string_view text, std::size_t width) {
   std::size_t characters = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    if ((static_cast<unsigned char>(text[i]) & 0xC0U) == 0x80U) continue;
+    if (continues_utf8(text[i])) continue;
     if (characters == width) return std::string(text.substr(0, i));
     ++characters;
   }
@@ -57,7 +55,7 @@ std::string cut_to(std::string_view text, std::size_t width) {
 
 std::vector<TopLine> TopView::draw(std::size_t width, std::size_t height) const {
   std::vector<TopLine> lines;
-  draw_head(lines, width);
+  draw_head(lines);
   if (help_) {
     draw_help(lines);
   } else {
@@ -72,16 +70,10 @@ std::vector<TopLine> TopView::draw(std::size_t width, std::size_t height) const 
   return lines;
 }
 
-void TopView::draw_head(std::vector<TopLine>& lines, std::size_t /*width*/) const {
-  std::map<std::string, std::size_t> states;
-  std::size_t instances = 0;
-  for (const Row& row : instance_table(hosts_, figures_, style_).rows) {
-    ++states[row["state"].get<std::string>()];
-    ++instances;
-  }
-  std::string text =
-      fmt::format("plcctl top: {}, {}", count_text(hosts_.size(), "host"), count_text(instances, "instance"));
-  for (const auto& [state, count] : states) text += fmt::format(", {} {}", count, state);
+void TopView::draw_head(std::vector<TopLine>& lines) const {
+  std::string text = fmt::format("plcctl top: {}, {}", count_text(hosts_.size(), "host"),
+                                 count_text(instances_, "instance"));
+  for (const auto& [state, count] : states_) text += fmt::format(", {} {}", count, state);
   if (paused_) text += "  PAUSED";
   lines.push_back({.text = std::move(text), .look = TopLine::Look::title});
   const auto mark = [&](Page page, const char* name) {
@@ -101,13 +93,12 @@ void TopView::draw_rows(std::vector<TopLine>& lines, std::size_t width, std::siz
     lines.push_back({.text = hosts_.empty() ? "no host answers" : "nothing to show"});
     return;
   }
-  const auto table =
-      table_lines(format_table(shown_.rows, shown_.columns, {.coloured = false, .width = width}));
-  if (table.empty() || height < 2) return;
+  if (height < 2) return;
+  const auto table = table_lines(shown_.rows, shown_.columns, {.coloured = false, .width = width});
   lines.push_back({.text = table.front() + std::string(width, ' '), .look = TopLine::Look::header});
   const std::size_t room = height - 1;
   const std::size_t first = place_ < room ? 0 : place_ - room + 1;
-  for (std::size_t i = first; i < shown_.rows.size() && i < first + room && i + 1 < table.size(); ++i) {
+  for (std::size_t i = first; i < shown_.rows.size() && i < first + room; ++i) {
     const bool chosen = i == place_;
     lines.push_back({.text = chosen ? table[i + 1] + std::string(width, ' ') : table[i + 1],
                      .look = chosen ? TopLine::Look::chosen : row_look(shown_.rows[i])});
@@ -125,8 +116,7 @@ void TopView::draw_losses(std::vector<TopLine>& lines, std::size_t width, std::s
     return;
   }
   losses.rows.resize(std::min({losses.rows.size(), kMostLosses, height > 3 ? height - 3 : 0}));
-  const auto table =
-      table_lines(format_table(losses.rows, losses.columns, {.coloured = false, .width = width}));
+  const auto table = table_lines(losses.rows, losses.columns, {.coloured = false, .width = width});
   for (std::size_t i = 0; i < table.size(); ++i) {
     lines.push_back({.text = i == 0 ? table[i] + std::string(width, ' ') : table[i],
                      .look = i == 0 ? TopLine::Look::header : TopLine::Look::plain});

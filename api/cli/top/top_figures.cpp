@@ -61,10 +61,7 @@ std::optional<std::int64_t> percentile_between(const plc_DurationHistogram& befo
 }
 
 TopFigures::Name TopFigures::name_of(const plc_TaskStatus& task) {
-  return fmt::format("{}/{}/{}", text_of(task.host), text_of(task.instance), text_of(task.task));
-}
-TopFigures::Name TopFigures::name_of(const plc_InstanceStatus& instance) {
-  return fmt::format("{}/{}", text_of(instance.host), text_of(instance.instance));
+  return fmt::format("{}/{}", instance_of(task), text_of(task.task));
 }
 TopFigures::Name TopFigures::name_of_core(const std::string& host, std::int32_t core) {
   return fmt::format("{}/{}", host, core);
@@ -92,8 +89,8 @@ void TopFigures::take(const std::vector<HostLook>& hosts, TimePoint now) {
   for (const HostLook& look : hosts) {
     std::map<Name, std::int32_t> core_of;
     for (const plc_InstanceStatus& instance : look.instances) {
-      instances[name_of(instance)] = 0;
-      core_of[name_of(instance)] = instance.core;
+      instances[instance_of(instance)] = 0;
+      core_of[instance_of(instance)] = instance.core;
       if (instance.core >= 0) cores[name_of_core(look.host.name, instance.core)] += 0;
     }
     for (const plc_TaskStatus& task : look.tasks) {
@@ -101,7 +98,7 @@ void TopFigures::take(const std::vector<HostLook>& hosts, TimePoint now) {
       Counted& counted = tasks[name];
       if (const auto old = tasks_.find(name); old != tasks_.end()) counted = std::move(old->second);
       count(counted, task, now);
-      const Name instance = fmt::format("{}/{}", text_of(task.host), text_of(task.instance));
+      const Name instance = instance_of(task);
       const auto there = core_of.find(instance);
       if (there == core_of.end()) continue;
       instances[instance] += counted.figures.load_percent;

@@ -8,8 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "api/cli/top/plant_look.hpp"
 #include "api/cli/top/trend.hpp"
+#include "api/dds/text.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -43,7 +46,11 @@ class TopFigures {
   /// "host/instance/task", "host/instance", and "host/core".
   using Name = std::string;
   [[nodiscard]] static Name name_of(const plc_TaskStatus& task);
-  [[nodiscard]] static Name name_of(const plc_InstanceStatus& instance);
+  /// Of the instance that a sample is about.
+  template <class Sample>
+  [[nodiscard]] static Name instance_of(const Sample& sample) {
+    return fmt::format("{}/{}", dds::text_of(sample.host), dds::text_of(sample.instance));
+  }
   [[nodiscard]] static Name name_of_core(const std::string& host, std::int32_t core);
 
   void take(const std::vector<HostLook>& hosts, TimePoint now);

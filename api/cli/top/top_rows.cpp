@@ -70,7 +70,7 @@ TopTable instance_table(const std::vector<HostLook>& hosts, const TopFigures& fi
     const auto sums = sums_of(look);
     for (const plc_InstanceStatus& status : look.instances) {
       const Row told = to_row(status);
-      const std::string name = TopFigures::name_of(status);
+      const std::string name = TopFigures::instance_of(status);
       const LoadFigures& load = figures.instance(name);
       const auto sum = sums.find(std::string(text_of(status.instance)));
       const Sums none;
@@ -170,8 +170,7 @@ TopTable loss_table(const std::vector<HostLook>& hosts, const std::string& insta
   std::vector<plc_LossStatus> losses;
   for (const HostLook& look : hosts) {
     for (const plc_LossStatus& loss : look.losses) {
-      if (fmt::format("{}/{}", text_of(loss.host), text_of(loss.instance)) == instance)
-        losses.push_back(loss);
+      if (TopFigures::instance_of(loss) == instance) losses.push_back(loss);
     }
   }
   std::ranges::sort(losses, std::greater(), &plc_LossStatus::number);
@@ -188,8 +187,7 @@ TopTable loss_table(const std::vector<HostLook>& hosts, const std::string& insta
 std::string exception_line(const std::vector<HostLook>& hosts, const std::string& instance) {
   for (const HostLook& look : hosts) {
     for (const plc_ExceptionStatus& one : look.exceptions) {
-      if (one.count == 0 || fmt::format("{}/{}", text_of(one.host), text_of(one.instance)) != instance)
-        continue;
+      if (one.count == 0 || TopFigures::instance_of(one) != instance) continue;
       const Row row = to_row(one);
       return fmt::format("exception {}: {} {} of {} {}", one.count, row.value("time", ""),
                          row.value("kind", ""), one.task[0] == 0 ? "no task" : text_of(one.task),

@@ -16,7 +16,7 @@ namespace plchost {
 
 namespace {
 
-enum Pair : short { kPlain = 0, kWell = 1, kWarning = 2, kBad = 3 };
+enum Pair : short { kWarning = 1, kBad = 2 };
 constexpr int kEscapeDelayMs = 25;
 
 attr_t attributes_of(TopLine::Look look, bool coloured) {
@@ -32,8 +32,6 @@ attr_t attributes_of(TopLine::Look look, bool coloured) {
       return A_UNDERLINE;
     case TopLine::Look::chosen:
       return A_REVERSE;
-    case TopLine::Look::well:
-      return pair(kWell, A_NORMAL);
     case TopLine::Look::warning:
       return pair(kWarning, A_BOLD);
     case TopLine::Look::bad:
@@ -108,7 +106,6 @@ Result<std::unique_ptr<TopScreen>> TopScreen::open(bool coloured) {
   terminal->coloured = coloured && ::has_colors() && ::start_color() == OK;
   if (terminal->coloured) {
     ::use_default_colors();
-    ::init_pair(kWell, COLOR_GREEN, -1);
     ::init_pair(kWarning, COLOR_YELLOW, -1);
     ::init_pair(kBad, COLOR_RED, -1);
   }

@@ -34,6 +34,10 @@ std::string of(std::string_view instance) {  // "line1 of cell1"
 void TopView::show(const std::vector<HostLook>& hosts, const TopFigures& figures) {
   hosts_ = hosts;
   figures_ = figures;
+  const TopTable all = instance_table(hosts_, figures_, style_);
+  instances_ = all.rows.size();
+  states_.clear();
+  for (const Row& row : all.rows) ++states_[row["state"].get<std::string>()];
   shown_ = table();
   keep_choice();
 }
@@ -208,8 +212,7 @@ std::string TopView::chosen_instance() const {
 
 const HostLook* TopView::host_of(std::string_view instance) const {
   const auto name = instance.substr(0, instance.find('/'));
-  const auto found = std::ranges::find(hosts_, name, [](const HostLook& look) { return look.host.name; });
-  return found == hosts_.end() ? nullptr : &*found;
+  return find_host(hosts_, name);
 }
 
 void TopView::ask(std::int32_t operation, const Words& words, std::string argument) {

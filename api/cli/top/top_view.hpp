@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,7 +21,7 @@ struct TopKey {
 
 /// A line of the screen.
 struct TopLine {
-  enum class Look : std::uint8_t { plain, title, header, chosen, well, warning, bad };
+  enum class Look : std::uint8_t { plain, title, header, chosen, warning, bad };
   std::string text;
   Look look = Look::plain;
 };
@@ -82,7 +83,7 @@ class TopView {
   [[nodiscard]] const HostLook* host_of(std::string_view instance) const;
   void keep_choice();
 
-  void draw_head(std::vector<TopLine>& lines, std::size_t width) const;
+  void draw_head(std::vector<TopLine>& lines) const;
   void draw_rows(std::vector<TopLine>& lines, std::size_t width, std::size_t height) const;
   void draw_losses(std::vector<TopLine>& lines, std::size_t width, std::size_t height) const;
   void draw_help(std::vector<TopLine>& lines) const;
@@ -91,6 +92,8 @@ class TopView {
   TrendStyle style_;
   std::vector<HostLook> hosts_;
   TopFigures figures_;
+  std::map<std::string, std::size_t> states_;  // how many instances are in each
+  std::size_t instances_ = 0;
   TopTable shown_;  // sorted and filtered
   Page page_ = Page::instances;
   std::string inside_;

@@ -14,12 +14,12 @@
 
 namespace plchost {
 
-namespace {
-
 Duration wait_for(std::int32_t operation) {
   const Operation* const known = find_operation(operation);
   return known != nullptr ? least_wait(*known) : Duration::zero();
 }
+
+namespace {
 
 // A refusal does not name the instance that was meant.
 std::string advice(CliSession& session, const HostOutcome& outcome, const std::string& instance) {

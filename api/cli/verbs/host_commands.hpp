@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,6 +8,9 @@
 #include "api/cli/cli_session.hpp"
 
 namespace plchost {
+
+/// The least time that a client waits for the answer, as least_wait() says it of plc_OPERATION_...
+[[nodiscard]] Duration wait_for(std::int32_t operation);
 
 /// Sends a command to the hosts that are meant and says what became of it at each; the exit code.
 /// `done`: the word about the instance when it was done ("stopped").

@@ -1,6 +1,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@
 #include "api/cli/terminal.hpp"
 #include "api/cli/top/top_screen.hpp"
 #include "api/cli/top/top_view.hpp"
+#include "api/cli/verbs/host_commands.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -36,8 +38,9 @@ class Top {
       if (now >= next_ && !view_.paused()) look(now);
       client_.wait_for_change(MonotonicClock::now());  // takes what has come, for the command, too
       end_command();
-      screen_.draw(view_.draw(screen_.width(), screen_.height()));
+      draw();
       if (const auto key = screen_.key(kKeyPatience)) {
+        is_stale_ = true;
         view_.press(*key, screen_.height() / 2);
         // The instance that is looked into now has figures of its own, at once.
         if (view_.inside() != inside_) next_ = {};
@@ -59,7 +62,15 @@ class Top {
       figures_.take(plant_.statistics(inside_.substr(0, slash), inside_.substr(slash + 1)));
     }
     view_.show(plant_.hosts(), figures_);
+    is_stale_ = true;
     next_ = now + every_;
+  }
+
+  void draw() {
+    const std::pair size(screen_.width(), screen_.height());
+    if (!std::exchange(is_stale_, false) && size == drawn_) return;
+    drawn_ = size;
+    screen_.draw(view_.draw(size.first, size.second));
   }
 
   void begin_command() {
@@ -71,7 +82,7 @@ class Top {
                                 .operation = command->operation,
                                 .instance = command->instance,
                                 .argument = command->argument};
-    call_ = client_.core().call(request, session_.deadline(kLongest));
+    call_ = client_.core().call(request, session_.deadline(wait_for(command->operation)));
     call_->start();
     view_.say("...");
   }
@@ -80,14 +91,12 @@ class Top {
     if (!call_ || !call_->done()) return;
     const auto reply = call_->take();
     call_.reset();
+    is_stale_ = true;
     next_ = {};
     if (!reply) return view_.say(printable(reply.error().describe()));
     if (reply->code != ErrorCode::ok) return view_.say(printable(reply->text));
     view_.say(done_);
   }
-
-  // Commands that end a cycle or a process.
-  static constexpr Duration kLongest = std::chrono::seconds(80);
 
   CliSession& session_;
   ControlClient& client_;
@@ -97,6 +106,8 @@ class Top {
   TopView view_;
   Duration every_;
   TimePoint next_{};
+  bool is_stale_ = true;                       // the screen shows something else
+  std::pair<std::size_t, std::size_t> drawn_;  // of that size
   std::string inside_;
   std::optional<Async<Result<ApiReply>>> call_;
   std::string done_;
