@@ -55,15 +55,7 @@ fail() {
   podman logs --tail 40 plc >&2 2>&1 || true
   exit 1
 }
-until_true() { # until_true SECONDS COMMAND...
-  local end=$((SECONDS + $1))
-  shift
-  until "$@" >/dev/null 2>&1; do
-    [ "$SECONDS" -lt "$end" ] || fail "did not happen in time: $*"
-    sleep 0.2
-  done
-}
-story() { echo "- $*"; }
+. tests/machine/stories.sh
 
 # Nothing of this machine's own podman is used, or left in it.
 runtime=() run=()
@@ -158,16 +150,7 @@ start_host() { # start_host CONFIGURATION
     -v "$work/applications:/applications:ro" -v "$1:/etc/plchost/plchost.toml" plchost >"$log" 2>&1 || fail "the host does not start"
 }
 on_host() { podman exec plc "$@"; }
-# Again while nobody answers (exit code 3), as in run.sh.
-plcctl() {
-  local try code
-  for try in 1 2 3 4 5; do
-    code=0
-    on_host plcctl --timeout 20 "$@" || code=$?
-    [ "$code" -eq 3 ] || break
-  done
-  return "$code"
-}
+plcctl() { asked on_host plcctl --timeout 20 "$@"; }
 # client NAME IMAGE PROGRAM ARGUMENT...: a container that shares /dev/shm with the host's, and nothing else. No rights are added.
 client() {
   podman run -d --name "$1" --network none "${joined[@]}" "${run[@]}" -v "$work/programs:/programs:ro" --entrypoint "/programs/$3" "$2" "${@:4}" \

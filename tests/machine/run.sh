@@ -51,15 +51,7 @@ fail() {
   exit 1
 }
 cannot() { told=yes; echo "no machine can be made here: $*; nothing was tested" >&2; exit 77; }
-until_true() { # until_true SECONDS COMMAND...
-  local end=$((SECONDS + $1))
-  shift
-  until "$@" >/dev/null 2>&1; do
-    [ "$SECONDS" -lt "$end" ] || fail "did not happen in time: $*"
-    sleep 0.2
-  done
-}
-story() { echo "- $*"; }
+. tests/machine/stories.sh
 
 [ "$(id -u)" -eq 0 ] || cannot "only root can"
 machine_environment=(HOME=/root TERM=dumb LC_ALL=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin DEBIAN_FRONTEND=noninteractive)
@@ -131,16 +123,7 @@ has_booted() { [[ "$(on_machine systemctl is-system-running || true)" =~ running
 machine_start
 until_true 900 has_booted
 
-# Again while nobody answers (exit code 3): a machine beside busy ones may stand still for so long.
-plcctl() {
-  local try code
-  for try in 1 2 3 4 5; do
-    code=0
-    on_machine plcctl --timeout 20 "$@" || code=$?
-    [ "$code" -eq 3 ] || break
-  done
-  return "$code"
-}
+plcctl() { asked on_machine plcctl --timeout 20 "$@"; }
 files() {
   on_machine find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /var/tmp -o -path /var/log -o -path /var/cache \
     -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/lib/systemd -o -path /packages -o -path /applications \) -prune -o -print | sort
